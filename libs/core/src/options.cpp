@@ -4,7 +4,6 @@
 #include <mrpt/config/CConfigFile.h>
 
 #include <algorithm>
-#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <filesystem>
@@ -12,29 +11,18 @@
 #include <numbers>
 #include <sstream>
 
+#include "riftmap/core/text.h"
+
 namespace riftmap {
 namespace {
 
-std::string lower(std::string s) {
-    std::transform(s.begin(), s.end(), s.begin(),
-                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-    return s;
-}
-
-std::string trimmed(const std::string& s) {
-    const auto first = s.find_first_not_of(" \t\r\n");
-    if (first == std::string::npos) {
-        return {};
-    }
-    return s.substr(first, s.find_last_not_of(" \t\r\n") - first + 1);
-}
-
-/// Shortest text that reads back to the same number.
 template <class T>
 std::string text(T value) {
-    char buffer[64];
-    const auto end = std::to_chars(buffer, buffer + sizeof(buffer), value).ptr;
-    return {buffer, end};
+    if constexpr (std::is_floating_point_v<T>) {
+        return toText(value);
+    } else {
+        return std::to_string(value);
+    }
 }
 
 template <class T>
@@ -65,36 +53,6 @@ T parseInRange(const std::string& raw, T min, T max) {
 template <class T>
 std::string rangeText(T min, T max) {
     return text(min) + " .. " + text(max);
-}
-
-std::size_t editDistance(const std::string& a, const std::string& b) {
-    std::vector<std::size_t> row(b.size() + 1);
-    for (std::size_t j = 0; j <= b.size(); ++j) {
-        row[j] = j;
-    }
-    for (std::size_t i = 1; i <= a.size(); ++i) {
-        std::size_t diagonal = row[0];
-        row[0] = i;
-        for (std::size_t j = 1; j <= b.size(); ++j) {
-            const std::size_t substituted = diagonal + (a[i - 1] == b[j - 1] ? 0U : 1U);
-            diagonal = row[j];
-            row[j] = std::min({substituted, row[j] + 1, row[j - 1] + 1});
-        }
-    }
-    return row.back();
-}
-
-std::string nearest(const std::string& name, const std::vector<std::string>& known) {
-    std::string best;
-    std::size_t bestDistance = std::string::npos;
-    for (const auto& candidate : known) {
-        const std::size_t d = editDistance(lower(name), lower(candidate));
-        if (d < bestDistance) {
-            bestDistance = d;
-            best = candidate;
-        }
-    }
-    return best;
 }
 
 /// Line number of a key in an INI file, for messages; 0 if it cannot be found.
@@ -277,10 +235,10 @@ void OptionTable::assign(const std::string& section, const std::string& key,
     }
     if (keys.empty()) {
         throw ConfigError(where + "unknown section [" + section + "]; did you mean [" +
-                          nearest(section, sections) + "]?");
+                          nearestName(section, sections) + "]?");
     }
     throw ConfigError(where + "unknown key '" + key + "' in [" + section + "]; did you mean '" +
-                      nearest(key, keys) + "'?");
+                      nearestName(key, keys) + "'?");
 }
 
 void OptionTable::load(const std::string& file) {
@@ -316,29 +274,32 @@ void OptionTable::load(const std::string& file) {
             }
         }
         for (const auto& key : keys) {
+            if (key.starts_with("//")) {  // MRPT's parser takes a comment with a '=' for a key
+                continue;
+            }
             assign(section, key, ini.read_string(section, key, "", true), where(key));
         }
     }
 }
 
-void OptionTable::set(const std::string& assignment) {
+void OptionTable::set(const std::string& assignment, const std::string& where) {
     const auto equals = assignment.find('=');
     const auto dot = assignment.find('.');
     if (equals == std::string::npos || dot == std::string::npos || dot > equals) {
-        throw ConfigError("--set '" + assignment + "': allowed: Section.key=value");
+        throw ConfigError(where + " '" + assignment + "': allowed: Section.key=value");
     }
     assign(trimmed(assignment.substr(0, dot)),
            trimmed(assignment.substr(dot + 1, equals - dot - 1)),
-           trimmed(assignment.substr(equals + 1)), "--set: ");
+           trimmed(assignment.substr(equals + 1)), where + ": ");
 }
 
 std::string OptionTable::dump() const {
     std::string out;
     for (const auto& [name, sectionText] : sections_) {
-        out += "// " + sectionText + "\n[" + name + "]\n";
+        out += "# " + sectionText + "\n[" + name + "]\n";
         for (const auto& option : options_) {
             if (option.section == name) {
-                out += "// " + option.text + (option.unit.empty() ? "" : " [" + option.unit + "]") +
+                out += "# " + option.text + (option.unit.empty() ? "" : " [" + option.unit + "]") +
                        " (" + option.allowed + "; default " + option.initial + ")\n" + option.key +
                        " = " + option.format() + "\n";
             }

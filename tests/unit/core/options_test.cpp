@@ -58,7 +58,8 @@ TEST(Options, LoadsEveryKind) {
     OptionTable table;
     sample.describe(table);
     table.load(
-        write("[Sample]\nlength=2.5 // metres\ncount=7\non=false\nangle_deg=45\n"
+        write("# a\n; b=1\n// c\n// count=8\n[Sample]\n// count=8\n#count=9\nlength=2.5 // "
+              "metres\ncount=7\non=false\nangle_deg=45\n"
               "origin=4 5 -6\ncolour=red\n"));
     EXPECT_EQ(sample.length, 2.5);
     EXPECT_EQ(sample.count, 7);

@@ -71,8 +71,8 @@ class OptionTable {
     /// Reads an INI file. Throws ConfigError: missing file, unknown section or key (with the
     /// nearest known one), a value that does not parse or is out of range; with file and line.
     void load(const std::string& file);
-    /// "Section.key=value", as --set gives it. Throws ConfigError.
-    void set(const std::string& assignment);
+    /// "Section.key=value", as --set gives it; `where` opens the message. Throws ConfigError.
+    void set(const std::string& assignment, const std::string& where = "--set");
 
     /// The whole configuration as INI text with comments; loads again to the same values.
     std::string dump() const;
