@@ -1,0 +1,252 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "riftmap/sim/ray_caster.h"
+
+#include <embree3/rtcore.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+#include "distance.h"
+
+namespace riftmap {
+namespace {
+
+// One thread builds the tree, and one instruction set walks it: which of two triangles with a
+// common edge a ray through that edge hits then does not depend on the machine.
+constexpr const char* kDeviceConfig = "threads=1,isa=sse4.2";
+
+std::string describe(RTCError error) {
+    switch (error) {
+        case RTC_ERROR_OUT_OF_MEMORY:
+            return "out of memory";
+        case RTC_ERROR_UNSUPPORTED_CPU:
+            return "processor not supported";
+        default:
+            return "error " + std::to_string(static_cast<int>(error));
+    }
+}
+
+template <class T>
+T* checked(T* pointer) {
+    if (pointer == nullptr) {
+        throw MeshError("ray caster: " + describe(rtcGetDeviceError(nullptr)));
+    }
+    return pointer;
+}
+
+RTCRay makeRay(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double tNear,
+               double tFar) {
+    RTCRay ray{};
+    ray.org_x = static_cast<float>(origin.x());
+    ray.org_y = static_cast<float>(origin.y());
+    ray.org_z = static_cast<float>(origin.z());
+    ray.dir_x = static_cast<float>(direction.x());
+    ray.dir_y = static_cast<float>(direction.y());
+    ray.dir_z = static_cast<float>(direction.z());
+    ray.tnear = static_cast<float>(tNear);
+    ray.tfar = static_cast<float>(tFar);
+    ray.time = 0;
+    ray.mask = ~0U;
+    ray.flags = 0;
+    return ray;
+}
+
+}  // namespace
+
+struct RayCaster::Scene {
+    explicit Scene(const TriangleMesh& mesh) : vertices(mesh.vertices), triangles(mesh.triangles) {
+        device = checked(rtcNewDevice(kDeviceConfig));
+        scene = checked(rtcNewScene(device));
+        rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
+        vertices.reserve(vertices.size() + 1);  // Embree reads 16 bytes from the last vertex
+        RTCGeometry geometry = checked(rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE));
+        rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                   vertices.data(), 0, sizeof(Eigen::Vector3f), vertices.size());
+        rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                   triangles.data(), 0, sizeof(std::array<std::uint32_t, 3>),
+                                   triangles.size());
+        rtcCommitGeometry(geometry);
+        rtcAttachGeometry(scene, geometry);
+        rtcReleaseGeometry(geometry);
+        rtcCommitScene(scene);
+        if (const RTCError error = rtcGetDeviceError(device); error != RTC_ERROR_NONE) {
+            release();
+            throw MeshError("ray caster: " + riftmap::describe(error));
+        }
+    }
+    ~Scene() { release(); }
+    Scene(const Scene&) = delete;
+    Scene& operator=(const Scene&) = delete;
+
+    void release() {
+        rtcReleaseScene(scene);
+        rtcReleaseDevice(device);
+    }
+
+    Triangle corners(std::uint32_t triangle) const {
+        const auto& t = triangles[triangle];
+        return {vertices[t[0]].cast<double>(), vertices[t[1]].cast<double>(),
+                vertices[t[2]].cast<double>()};
+    }
+
+    std::vector<Eigen::Vector3f> vertices;
+    std::vector<std::array<std::uint32_t, 3>> triangles;
+    RTCDevice device = nullptr;
+    RTCScene scene = nullptr;
+};
+
+RayCaster::RayCaster(const TriangleMesh& mesh) {
+    validate(mesh, "mesh");
+    scene_ = std::make_unique<Scene>(mesh);
+}
+RayCaster::~RayCaster() = default;
+RayCaster::RayCaster(RayCaster&&) noexcept = default;
+RayCaster& RayCaster::operator=(RayCaster&&) noexcept = default;
+
+std::optional<Hit> RayCaster::cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
+                                   double tMax) const {
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    RTCRayHit query{};
+    query.ray = makeRay(origin, direction, 0, tMax);
+    query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+    query.hit.primID = RTC_INVALID_GEOMETRY_ID;
+    query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+    rtcIntersect1(scene_->scene, &context, &query);
+    if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) {
+        return std::nullopt;
+    }
+    Hit hit;
+    hit.triangle = query.hit.primID;
+    hit.u = query.hit.u;
+    hit.v = query.hit.v;
+    hit.t = static_cast<double>(query.ray.tfar);
+    const Triangle c = scene_->corners(hit.triangle);
+    const Eigen::Vector3d n = (c[1] - c[0]).cross(c[2] - c[0]);
+    const double length = n.norm();
+    if (length > 0) {
+        hit.normal = n / length;
+        // Embree's t is in single precision; the plane gives it in double.
+        const double slope = hit.normal.dot(direction);
+        if (std::abs(slope) > 1e-6 * direction.norm()) {
+            hit.t = hit.normal.dot(c[0] - origin) / slope;
+        }
+    }
+    return hit;
+}
+
+bool RayCaster::occluded(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double margin) const {
+    const Eigen::Vector3d d = b - a;
+    const double length = d.norm();
+    if (length <= 2 * margin) {
+        return false;
+    }
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    RTCRay ray = makeRay(a, d, margin / length, 1 - margin / length);
+    rtcOccluded1(scene_->scene, &context, &ray);
+    return ray.tfar < 0;
+}
+
+namespace {
+
+/// What the callback of a point query needs and finds.
+template <class SceneT>
+struct Search {
+    const SceneT& scene;
+    Eigen::Vector3d a, b;  ///< the segment; a == b for a point
+    double best;           ///< [m]
+    double slack;          ///< radius of the query beyond `best`
+    std::optional<std::uint32_t> triangle;
+    Eigen::Vector3d point;
+};
+
+template <class SceneT>
+bool visitPoint(RTCPointQueryFunctionArguments* arguments) {
+    auto& search = *static_cast<Search<SceneT>*>(arguments->userPtr);
+    const Triangle c = search.scene.corners(arguments->primID);
+    const Eigen::Vector3d p = closestPoint(search.a, c);
+    const double distance = (p - search.a).norm();
+    // Of equally near triangles the first in the file, whatever the order of the tree.
+    if (distance < search.best ||
+        (distance == search.best && search.triangle && arguments->primID < *search.triangle)) {
+        search.best = distance;
+        search.triangle = arguments->primID;
+        search.point = p;
+        arguments->query->radius = static_cast<float>(distance + search.slack);
+        return true;
+    }
+    return false;
+}
+
+template <class SceneT>
+bool visitSegment(RTCPointQueryFunctionArguments* arguments) {
+    auto& search = *static_cast<Search<SceneT>*>(arguments->userPtr);
+    const double distance =
+        segmentDistance(search.a, search.b, search.scene.corners(arguments->primID));
+    if (distance < search.best) {
+        search.best = distance;
+        arguments->query->radius = static_cast<float>(distance + search.slack);
+        return true;
+    }
+    return false;
+}
+
+/// Queries are rounded to single precision: they look this much farther than asked [m].
+double roundingOf(const Eigen::Vector3d& p) {
+    return 1e-6 * (1 + p.cwiseAbs().maxCoeff());
+}
+
+RTCPointQuery makeQuery(const Eigen::Vector3d& p, double radius) {
+    RTCPointQuery query{};
+    query.x = static_cast<float>(p.x());
+    query.y = static_cast<float>(p.y());
+    query.z = static_cast<float>(p.z());
+    query.time = 0;
+    query.radius = static_cast<float>(radius);
+    return query;
+}
+
+}  // namespace
+
+std::optional<Closest> RayCaster::closest(const Eigen::Vector3d& point, double maxDistance) const {
+    const double slack = roundingOf(point);
+    RTCPointQueryContext context;
+    rtcInitPointQueryContext(&context);
+    RTCPointQuery query = makeQuery(point, maxDistance + slack);
+    Search<Scene> search{*scene_, point, point, maxDistance, slack, std::nullopt, point};
+    rtcPointQuery(scene_->scene, &query, &context, visitPoint<Scene>, &search);
+    if (!search.triangle) {
+        return std::nullopt;
+    }
+    return Closest{search.point, search.best, *search.triangle};
+}
+
+double RayCaster::sweptDistance(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+                                double maxDistance) const {
+    const double length = (b - a).norm();
+    // Short pieces keep the balls of the queries small.
+    const int pieces = std::max(1, static_cast<int>(std::ceil(length / (4 * maxDistance + 1e-3))));
+    double best = maxDistance;
+    for (int i = 0; i < pieces && best > 0; ++i) {
+        const Eigen::Vector3d p = a + (b - a) * (static_cast<double>(i) / pieces);
+        const Eigen::Vector3d q = a + (b - a) * (static_cast<double>(i + 1) / pieces);
+        const Eigen::Vector3d middle = (p + q) / 2;
+        const double slack = (q - p).norm() / 2 + roundingOf(middle);
+        RTCPointQueryContext context;
+        rtcInitPointQueryContext(&context);
+        RTCPointQuery query = makeQuery(middle, best + slack);
+        Search<Scene> search{*scene_, p, q, best, slack, std::nullopt, p};
+        rtcPointQuery(scene_->scene, &query, &context, visitSegment<Scene>, &search);
+        best = search.best;
+    }
+    return best;
+}
+
+bool RayCaster::sweptClear(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+                           double clearance) const {
+    return sweptDistance(a, b, clearance) >= clearance;
+}
+
+}  // namespace riftmap
