@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "riftmap/planner/astar.h"
+
+#include <gtest/gtest.h>
+
+#include <boost/graph/adjacency_list.hpp>
+#include <boost/graph/dijkstra_shortest_paths.hpp>
+#include <random>
+
+namespace riftmap {
+namespace {
+
+/// A plain graph with the three functions that the search asks for.
+struct TestGraph {
+    struct Edge {
+        VertexId to;
+        float weight;
+    };
+    std::vector<Eigen::Vector3f> points;
+    std::vector<std::vector<Edge>> edges;
+
+    VertexId idLimit() const { return static_cast<VertexId>(points.size()); }
+    Eigen::Vector3f position(VertexId id) const { return points[id]; }
+    template <class F>
+    void forEachEdge(VertexId id, const F& f) const {
+        for (const Edge& e : edges[id]) {
+            f(e.to, e.weight);
+        }
+    }
+    void connect(VertexId a, VertexId b, float factor) {
+        // Rounded up: never below the straight distance.
+        const float w = (points[a] - points[b]).norm() * factor * 1.00001F;
+        edges[a].push_back({b, w});
+        edges[b].push_back({a, w});
+    }
+};
+
+/// Random points joined to some near ones, with detours; falls into several parts.
+TestGraph randomGraph(std::mt19937& random, std::size_t n) {
+    TestGraph g;
+    std::uniform_real_distribution<float> coordinate(0, 1);
+    for (std::size_t i = 0; i < n; ++i) {
+        g.points.emplace_back(coordinate(random), coordinate(random), 0.2F * coordinate(random));
+    }
+    g.edges.resize(n);
+    const float reach = 1.5F / std::sqrt(static_cast<float>(n));
+    for (VertexId a = 0; a < n; ++a) {
+        for (VertexId b = a + 1; b < n; ++b) {
+            if ((g.points[a] - g.points[b]).norm() < reach && coordinate(random) < 0.7F) {
+                g.connect(a, b, 1.0F + coordinate(random));
+            }
+        }
+    }
+    return g;
+}
+
+std::vector<double> boostDistances(const TestGraph& g, VertexId source) {
+    using Boost =
+        boost::adjacency_list<boost::vecS, boost::vecS, boost::directedS, boost::no_property,
+                              boost::property<boost::edge_weight_t, double>>;
+    Boost graph(g.points.size());
+    for (VertexId a = 0; a < g.idLimit(); ++a) {
+        for (const auto& e : g.edges[a]) {
+            boost::add_edge(a, e.to, static_cast<double>(e.weight), graph);
+        }
+    }
+    std::vector<double> distance(g.points.size());
+    boost::dijkstra_shortest_paths(graph, source,
+                                   boost::distance_map(boost::make_iterator_property_map(
+                                       distance.begin(), boost::get(boost::vertex_index, graph))));
+    return distance;
+}
+
+double lengthOf(const TestGraph& g, const std::vector<VertexId>& path) {
+    double sum = 0;
+    for (std::size_t i = 1; i < path.size(); ++i) {
+        double best = std::numeric_limits<double>::infinity();
+        for (const auto& e : g.edges[path[i - 1]]) {
+            best = e.to == path[i] ? std::min(best, static_cast<double>(e.weight)) : best;
+        }
+        sum += best;
+    }
+    return sum;
+}
+
+TEST(GraphSearch, isAsShortAsBoostOnRandomGraphs) {
+    const unsigned seed = std::random_device{}();
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937 random(seed);
+    GraphSearch search;  // one for all: stamps must keep the searches apart
+    int found = 0;
+    int parted = 0;
+    for (int round = 0; round < 30; ++round) {
+        const TestGraph g = randomGraph(random, 50 + 10 * static_cast<std::size_t>(round));
+        std::uniform_int_distribution<VertexId> any(0, g.idLimit() - 1);
+        const VertexId source = any(random);
+        const std::vector<double> reference = boostDistances(g, source);
+        for (int i = 0; i < 10; ++i) {
+            const VertexId goal = any(random);
+            const auto path = search.shortestPath(g, source, goal);
+            if (reference[goal] == std::numeric_limits<double>::max()) {
+                EXPECT_FALSE(path);
+                ++parted;
+                continue;
+            }
+            ASSERT_TRUE(path);
+            ++found;
+            EXPECT_EQ(path->vertices.front(), source);
+            EXPECT_EQ(path->vertices.back(), goal);
+            EXPECT_NEAR(path->length, reference[goal], 1e-9);
+            EXPECT_NEAR(lengthOf(g, path->vertices), path->length, 1e-9);
+        }
+    }
+    EXPECT_GT(found, 50);
+    EXPECT_GT(parted, 5);
+}
+
+TEST(GraphSearch, distancesEqualBoostToAllTargets) {
+    const unsigned seed = std::random_device{}();
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937 random(seed);
+    GraphSearch search;
+    for (int round = 0; round < 10; ++round) {
+        const TestGraph g = randomGraph(random, 300);
+        const std::vector<double> reference = boostDistances(g, 0);
+        std::vector<VertexId> targets;
+        for (VertexId id = 0; id < g.idLimit(); id += 7) {
+            targets.push_back(id);
+        }
+        targets.push_back(targets.front());  // twice the same is no trouble
+        const std::vector<double> distance = search.distances(g, 0, targets);
+        for (std::size_t i = 0; i < targets.size(); ++i) {
+            const double expected = reference[targets[i]];
+            if (expected == std::numeric_limits<double>::max()) {
+                EXPECT_TRUE(std::isinf(distance[i]));
+            } else {
+                EXPECT_NEAR(distance[i], expected, 1e-9);
+            }
+        }
+    }
+}
+
+TEST(GraphSearch, looksOnlyTowardsTheGoal) {
+    TestGraph g;
+    const VertexId side = 100;
+    for (VertexId i = 0; i < side * side; ++i) {
+        g.points.emplace_back(static_cast<float>(i % side), static_cast<float>(i / side), 0.0F);
+    }
+    g.edges.resize(g.points.size());
+    for (VertexId i = 0; i < side * side; ++i) {
+        if (i % side + 1 < side) {
+            g.connect(i, i + 1, 1.0F);
+        }
+        if (i + side < side * side) {
+            g.connect(i, i + side, 1.0F);
+        }
+    }
+    GraphSearch search;
+    const VertexId row = 50 * side;
+    const auto path = search.shortestPath(g, row + 20, row + 80);
+    ASSERT_TRUE(path);
+    EXPECT_EQ(path->vertices.size(), 61U);
+    EXPECT_LT(search.expanded(), 200U);  // Dijkstra's circle would hold about 7,000
+}
+
+TEST(GraphSearch, fromItselfIsAVertexLong) {
+    TestGraph g;
+    g.points.emplace_back(0.0F, 0.0F, 0.0F);
+    g.edges.resize(1);
+    const auto path = GraphSearch().shortestPath(g, 0, 0);
+    ASSERT_TRUE(path);
+    EXPECT_EQ(path->vertices, std::vector<VertexId>{0});
+    EXPECT_EQ(path->length, 0.0);
+    EXPECT_THROW(GraphSearch().shortestPath(g, 1, 0), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace riftmap
