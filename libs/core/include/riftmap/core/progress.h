@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <iosfwd>
+#include <optional>
+#include <string>
+
+namespace riftmap {
+
+/// A line on stderr with share, rate and time left. On a terminal it refreshes in place; elsewhere
+/// (a log file) it is a line at every tenth of the way. Not thread-safe.
+class Progress {
+ public:
+    /// `total` steps of `unit` ("views"); 0 = not known beforehand. Silent unless `enabled`.
+    Progress(std::string what, std::string unit, std::size_t total, bool enabled);
+    /// For tests: another stream, and whether that is a terminal.
+    Progress(std::string what, std::string unit, std::size_t total, std::ostream& out,
+             bool isTerminal);
+    ~Progress();
+    Progress(const Progress&) = delete;
+    Progress& operator=(const Progress&) = delete;
+
+    /// `done` steps are behind us.
+    void update(std::size_t done);
+
+    /// "building 12/40 views (30 %), 5.1 views/s, 6 s left"
+    std::string line(std::size_t done, double elapsedSeconds) const;
+
+ private:
+    using Clock = std::chrono::steady_clock;
+
+    void print(std::size_t done, bool last);
+
+    std::string what_, unit_;
+    std::size_t total_;
+    std::ostream* out_;  ///< null = silent
+    bool isTerminal_;
+    Clock::time_point start_ = Clock::now();
+    std::optional<Clock::time_point> printed_;
+    std::size_t done_ = 0, printedTenth_ = 0, width_ = 0;
+};
+
+}  // namespace riftmap
