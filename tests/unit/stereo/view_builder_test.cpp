@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "riftmap/stereo/view_builder.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+#include <stdexcept>
+
+#include "riftmap/core/options.h"
+#include "riftmap/stereo/grey.h"
+#include "riftmap/stereo/isolated.h"
+
+namespace riftmap {
+namespace {
+
+using ::testing::HasSubstr;
+
+/// A fronto-parallel plane at one disparity: smooth random texture, shifted.
+StereoObservation planeAt(int disparity) {
+    cv::Mat texture(120, 300, CV_8UC1);
+    cv::RNG rng(1);
+    rng.fill(texture, cv::RNG::UNIFORM, 0, 256);
+    cv::GaussianBlur(texture, texture, {5, 5}, 1.0);
+    StereoObservation o;
+    o.camera = {
+        .width = 200, .height = 120, .fx = 200, .fy = 200, .cx = 99.5, .cy = 59.5, .baseline = 0.1};
+    o.left = texture.colRange(50, 250).clone();
+    o.right = texture.colRange(50 + disparity, 250 + disparity).clone();
+    return o;
+}
+
+template <class F>
+std::string messageOf(F&& f) {
+    try {
+        f();
+    } catch (const std::exception& e) {
+        return e.what();
+    }
+    return {};
+}
+
+class EveryMatcher : public ::testing::TestWithParam<MatcherKind> {};
+
+TEST_P(EveryMatcher, FindsAPlane) {
+    StereoOptions options;
+    options.matcher = GetParam();
+    options.numDisparities = 32;
+    ViewBuilder builder(options);
+    const View view = builder.build(planeAt(20));
+    const DisparityImage& d = view.disparity;
+    EXPECT_EQ(d.firstColumn, 31);
+    EXPECT_EQ(d.minDisparity, 0);
+    EXPECT_EQ(d.maxDisparity, 31);
+    int matched = 0;
+    int right = 0;
+    for (int r = 0; r < d.height; ++r) {
+        for (int c = 0; c < d.width; ++c) {
+            if (d.valid(c, r)) {
+                ++matched;
+                right += std::abs(d.at(c, r) - 20) < 0.5 ? 1 : 0;
+                EXPECT_GT(d.sigma[d.index(c, r)], 0);
+                EXPECT_GE(c, d.firstColumn);
+            }
+        }
+    }
+    EXPECT_GT(matched, (200 - 31) * 120 * 8 / 10);
+    EXPECT_GE(right, matched * 995 / 1000);
+}
+
+TEST_P(EveryMatcher, TakesColourAndSixteenBit) {
+    StereoOptions options;
+    options.matcher = GetParam();
+    options.numDisparities = 32;
+    const auto matcher = makeStereoMatcher(options);
+    const StereoObservation o = planeAt(7);
+    DisparityImage grey, colour, deep;
+    matcher->compute(o.left, o.right, grey);
+    cv::Mat left, right;
+    cv::cvtColor(o.left, left, cv::COLOR_GRAY2BGR);
+    cv::cvtColor(o.right, right, cv::COLOR_GRAY2BGR);
+    matcher->compute(left, right, colour);
+    EXPECT_EQ(grey.disparity, colour.disparity);
+    o.left.convertTo(left, CV_16U, 16);  // 12 bits in 16
+    o.right.convertTo(right, CV_16U, 16);
+    matcher->compute(left, right, deep);
+    EXPECT_EQ(grey.disparity, deep.disparity);
+    EXPECT_EQ(grey.sigma, deep.sigma);
+}
+
+TEST_P(EveryMatcher, RefusesWhatIsNoPair) {
+    StereoOptions options;
+    options.matcher = GetParam();
+    const auto matcher = makeStereoMatcher(options);
+    DisparityImage out;
+    const cv::Mat a(20, 30, CV_8UC1, cv::Scalar(0)), b(20, 31, CV_8UC1, cv::Scalar(0));
+    EXPECT_THAT(messageOf([&] { matcher->compute(a, b, out); }),
+                AllOf(HasSubstr("30 x 20"), HasSubstr("31 x 20")));
+    EXPECT_THAT(messageOf([&] { matcher->compute(a, {}, out); }),
+                HasSubstr("right image is empty"));
+    EXPECT_THAT(messageOf([&] { matcher->compute(cv::Mat(20, 30, CV_32FC1), a, out); }),
+                HasSubstr("allowed: 8 or 16 bit"));
+}
+
+INSTANTIATE_TEST_SUITE_P(Stereo, EveryMatcher,
+                         ::testing::Values(MatcherKind::kPaper, MatcherKind::kOpenCvBlock,
+                                           MatcherKind::kOpenCvSgbm));
+
+TEST(ViewBuilder, TakesTheDisparityThatTheObservationBrings) {
+    StereoOptions options;
+    options.matcher = MatcherKind::kGiven;
+    options.sigmaGiven = 0.25;
+    ViewBuilder builder(options);
+    StereoObservation o = planeAt(5);
+    EXPECT_THAT(messageOf([&] { builder.build(o); }), HasSubstr("brings no disparity"));
+    o.disparity.emplace();
+    o.disparity->resize(200, 120);
+    o.disparity->disparity[7] = 3.5F;
+    o.disparity->disparity[8] = 4.5F;
+    o.disparity->sigma[8] = 0.5F;
+    const View view = builder.build(o);
+    EXPECT_EQ(view.disparity.disparity, o.disparity->disparity);
+    EXPECT_EQ(view.disparity.sigma[7], 0.25F);
+    EXPECT_EQ(view.disparity.sigma[8], 0.5F);
+    o.disparity->resize(100, 120);
+    EXPECT_THAT(messageOf([&] { builder.build(o); }), HasSubstr("given disparity is 100 x 120"));
+}
+
+TEST(RemoveIsolated, DropsSmallGroupsOnly) {
+    DisparityImage d;
+    d.resize(6, 3);
+    for (const std::size_t i : {0U, 1U, 6U, 4U}) {
+        d.disparity[i] = 10.0F;
+    }
+    d.disparity[7] = 12.0F;  // beside a group, but at another depth
+    removeIsolated(d, 3, 1.0F);
+    EXPECT_TRUE(d.valid(0, 0) && d.valid(1, 0) && d.valid(0, 1));
+    EXPECT_FALSE(d.valid(4, 0) || d.valid(1, 1));
+}
+
+}  // namespace
+}  // namespace riftmap
