@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <mrpt/obs/CObservation.h>
+#include <mrpt/obs/CObservationStereoImages.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "riftmap/core/view.h"
+
+namespace riftmap {
+
+/// Pose of a camera that looks ahead, on a robot (x forward, y left, z up).
+Pose forwardCamera();
+
+/// Writes a rawlog of observations in MRPT's own classes, so that every program of MRPT reads it.
+/// The file appears under its name when finish() is done. Not thread-safe.
+class RawlogWriter {
+ public:
+    enum class Images {
+        kEmbedded,  ///< inside the rawlog, lossless
+        kExternal,  ///< PNG files in NAME_Images beside NAME.rawlog
+    };
+
+    /// Throws FileError where the file cannot be made.
+    explicit RawlogWriter(const std::filesystem::path& file, Images images = Images::kEmbedded);
+    ~RawlogWriter();  ///< without finish(): nothing is left behind but images
+    RawlogWriter(const RawlogWriter&) = delete;
+    RawlogWriter& operator=(const RawlogWriter&) = delete;
+
+    /// A note at a time (MRPT's own tools give the time range of a file by all its objects).
+    void comment(std::int64_t time_ns, const std::string& text);
+    /// A pose of the robot in the map frame, label "pose".
+    void robotPose(std::int64_t time_ns, const Pose& world_T_robot);
+    /// A pair as it is; its images may be moved out to files.
+    void pair(mrpt::obs::CObservationStereoImages& observation);
+
+    /// Robot pose and rectified pair, the camera looking ahead on the robot. Returns the camera's
+    /// pose as a reader will see it: angles and quaternions in the file cost the last bits, and
+    /// a map to be built again to the byte must be built from this one.
+    Pose write(const StereoObservation& observation, const std::string& label = "stereo");
+
+    /// Closes the file, reads its end back (MRPT does not notice a full disk) and gives it its
+    /// name. Throws FileError.
+    void finish();
+
+ private:
+    class Impl;
+    std::unique_ptr<Impl> impl_;
+};
+
+/// A rectified pair as an MRPT observation: calibration, images (copied), time, label and the pose
+/// of the camera on the robot.
+mrpt::obs::CObservationStereoImages::Ptr toMrpt(const StereoObservation& observation,
+                                                const Pose& robot_T_camera,
+                                                const std::string& label);
+
+}  // namespace riftmap

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "import_files.h"
+
+#include <opencv2/imgcodecs.hpp>
+#include <sstream>
+
+#include "riftmap/core/text.h"
+
+namespace riftmap {
+
+std::vector<TextLine> readLines(const std::filesystem::path& file) {
+    std::istringstream in(readFile(file));
+    std::vector<TextLine> lines;
+    std::string line;
+    for (std::size_t number = 1; std::getline(in, line); ++number) {
+        const auto text = trimmed(line);
+        if (!text.empty() && text.front() != '#') {
+            lines.push_back({number, text});
+        }
+    }
+    return lines;
+}
+
+std::vector<double> numbersIn(const std::string& text, const std::string& where) {
+    std::string spaced = text;
+    for (char& c : spaced) {
+        if (c == ',' || c == ';' || c == '\r' || c == '\n') {
+            c = ' ';
+        }
+    }
+    std::vector<double> numbers;
+    for (const auto word : words(spaced)) {
+        const auto number = toDouble(word);
+        if (!number) {
+            throw FileError(where + ": '" + std::string(word) + "' is not a number");
+        }
+        numbers.push_back(*number);
+    }
+    return numbers;
+}
+
+cv::Mat readImage(const std::filesystem::path& file) {
+    if (!std::filesystem::is_regular_file(file)) {
+        throw FileError(file.string() + ": no such file");
+    }
+    const cv::Mat image = cv::imread(file.string(), cv::IMREAD_ANYCOLOR | cv::IMREAD_ANYDEPTH);
+    if (image.empty()) {
+        throw FileError(file.string() + ": not an image that can be read");
+    }
+    if (image.depth() != CV_8U) {
+        throw FileError(file.string() + ": not an 8-bit image");
+    }
+    return image;
+}
+
+void checkSameSize(const cv::Mat& left, const cv::Mat& right, const std::filesystem::path& leftFile,
+                   const std::filesystem::path& rightFile) {
+    if (left.size() != right.size()) {
+        throw FileError(leftFile.string() + " is " + std::to_string(left.cols) + "x" +
+                        std::to_string(left.rows) + " px, " + rightFile.string() + " " +
+                        std::to_string(right.cols) + "x" + std::to_string(right.rows));
+    }
+}
+
+}  // namespace riftmap
