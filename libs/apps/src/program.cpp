@@ -171,6 +171,22 @@ const std::filesystem::path& Program::requiredOut() const {
     return out_;
 }
 
+RunDirectory Program::makeRunDirectory(const std::vector<std::filesystem::path>& inputs) const {
+    const RunInfo info{.program = name_,
+                       .command = command_,
+                       .config = table_.dump(),
+                       .seed = seed_,
+                       .threads = threads(),
+                       .inputs = inputs};
+    return RunDirectory(requiredOut(), info, overwrite_);
+}
+
+void Program::checkMayWrite(const std::filesystem::path& file) const {
+    if (!overwrite_ && std::filesystem::exists(file)) {
+        throw ConfigError(file.string() + ": is there already; --overwrite replaces it");
+    }
+}
+
 int Program::threads() const {
     return threads_ > 0 ? threads_ : tbb::info::default_concurrency();
 }

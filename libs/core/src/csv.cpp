@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "riftmap/core/file.h"
+#include "riftmap/core/text.h"
 
 namespace riftmap {
 namespace {
@@ -53,6 +54,8 @@ std::optional<std::vector<std::string>> split(const std::string& line) {
 }
 
 }  // namespace
+
+std::string Field::number(float value) { return toText(value); }
 
 std::string Field::number(double value) {
     char buffer[64];

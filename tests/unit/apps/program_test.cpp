@@ -13,6 +13,8 @@
 #include <string>
 #include <vector>
 
+#include "riftmap/core/file.h"
+
 namespace riftmap {
 namespace {
 
@@ -44,8 +46,10 @@ class SampleProgram : public Program {
     std::function<void()> failure;
 
     using Program::argument;
+    using Program::checkMayWrite;
     using Program::commandText;
     using Program::configFiles;
+    using Program::makeRunDirectory;
     using Program::out;
     using Program::overwrite;
     using Program::positionals;
@@ -219,6 +223,48 @@ TEST(Program, WrongConfigurationFoundWhileRunningIsTwo) {
     SampleProgram program;
     program.failure = [] { throw ConfigError("[World] mesh: no such file"); };
     EXPECT_EQ(outcome(program, {"a"}).code, 2);
+}
+
+TEST(Program, RunDirectoryRecordsTheRun) {
+    const auto dir = std::filesystem::path(testing::TempDir()) / "riftmap_program_run";
+    std::filesystem::remove_all(dir);
+    const auto input = writeIni("input.txt", "abc");
+    const Arguments arguments = {input,    "--out", dir.string(), "--set", "Sample.length=3",
+                                 "--seed", "9"};
+    const auto run = [&](Arguments with) {
+        SampleProgram program;
+        program.failure = [&] { program.makeRunDirectory({input}); };
+        return outcome(program, with);
+    };
+    ASSERT_EQ(run(arguments).code, 0);
+    const std::string manifest = readFile(dir / "manifest.yaml");
+    EXPECT_THAT(manifest, HasSubstr("seed: 9\n"));
+    EXPECT_THAT(manifest, HasSubstr("program: riftmap-sample\n"));
+    EXPECT_THAT(manifest, HasSubstr("--set Sample.length=3"));
+    EXPECT_THAT(manifest,
+                HasSubstr("ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"));
+
+    const Outcome again = run(arguments);
+    EXPECT_EQ(again.code, 2);
+    EXPECT_THAT(again.err, HasSubstr("holds an older run"));
+    Arguments overwriting = arguments;
+    overwriting.emplace_back("-w");
+    EXPECT_EQ(run(overwriting).code, 0);
+
+    SampleProgram same;
+    ASSERT_TRUE(same.initialize({(dir / "config_used.ini").string(), "a"}));
+    EXPECT_EQ(same.length, 3);
+    EXPECT_EQ(same.seed(), 9U);
+}
+
+TEST(Program, FilesAreReplacedOnlyIfAsked) {
+    const auto file = writeIni("kept.txt", "abc");
+    SampleProgram careful, bold;
+    ASSERT_TRUE(careful.initialize({"a"}));
+    ASSERT_TRUE(bold.initialize({"a", "--overwrite"}));
+    EXPECT_THROW(careful.checkMayWrite(file), ConfigError);
+    EXPECT_NO_THROW(careful.checkMayWrite(file + ".other"));
+    EXPECT_NO_THROW(bold.checkMayWrite(file));
 }
 
 TEST(Program, SuccessIsSilentAndZero) {

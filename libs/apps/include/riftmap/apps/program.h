@@ -12,6 +12,7 @@
 
 #include "riftmap/apps/command_line.h"
 #include "riftmap/core/options.h"
+#include "riftmap/core/run_directory.h"
 
 namespace riftmap {
 
@@ -74,6 +75,13 @@ class Program : public mrpt::system::COutputLogger {
     bool progress() const { return !noProgress_; }               ///< --no-progress not given
     const std::string& commandText() const { return command_; }  ///< as typed, for manifests
     const std::vector<std::string>& configFiles() const;
+
+    /// The run directory named by --out, with its manifest and config_used.ini; -w allows an older
+    /// run to be replaced. `inputs`: files whose hashes go into the manifest. Throws ConfigError.
+    RunDirectory makeRunDirectory(const std::vector<std::filesystem::path>& inputs = {}) const;
+    /// Throws ConfigError if the file is there and -w was not given: for programs whose --out is a
+    /// file.
+    void checkMayWrite(const std::filesystem::path& file) const;
 
  private:
     void declare();

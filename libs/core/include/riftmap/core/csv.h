@@ -8,6 +8,7 @@
 #include <initializer_list>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace riftmap {
@@ -22,13 +23,14 @@ class Field {
     Field(bool value) : text_(value ? "true" : "false") {}
     template <std::integral T>
     Field(T value) : text_(std::to_string(value)) {}
-    template <std::floating_point T>
-    Field(T value) : text_(number(static_cast<double>(value))) {}
+    Field(float value) : text_(number(value)) {}
+    Field(double value) : text_(number(value)) {}
 
     const std::string& text() const { return text_; }
     bool isText() const { return isText_; }  ///< not a number or a truth value
 
  private:
+    static std::string number(float value);
     static std::string number(double value);
 
     std::string text_;
