@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <sstream>
+#include <stdexcept>
+
+#include "riftmap/eval/observable.h"
+
+namespace riftmap {
+
+namespace {
+
+constexpr double kMostNodes = 1 << 24;
+
+std::string text(const Eigen::Vector3d& p) {
+    std::ostringstream out;
+    out << '(' << p.x() << ' ' << p.y() << ' ' << p.z() << ')';
+    return out.str();
+}
+
+void checkStart(const RayCaster& caster, const ViewSpace& space) {
+    const bool inside = (space.start.array() >= space.boxMin.array()).all() &&
+                        (space.start.array() <= space.boxMax.array()).all();
+    if (!inside) {
+        throw std::runtime_error("the start " + text(space.start) +
+                                 " lies outside the workspace box " + text(space.boxMin) + " .. " +
+                                 text(space.boxMax));
+    }
+    if (const auto wall = caster.closest(space.start, space.clearance)) {
+        throw std::runtime_error("the start " + text(space.start) + " is " +
+                                 std::to_string(wall->distance) +
+                                 " m from a surface, nearer than the clearance of " +
+                                 std::to_string(space.clearance) + " m");
+    }
+}
+
+}  // namespace
+
+ReachableSpace::ReachableSpace(const RayCaster& caster, const ViewSpace& space, double grid)
+    : caster_(&caster), space_(space), grid_(grid) {
+    checkStart(caster, space);
+    if (grid_ <= 0) {
+        grid_ = std::clamp(space.clearance / 2, 0.02, 0.1);
+    }
+    // Node 0 is the last one at or beyond boxMin that is a whole number of steps from the start.
+    const auto stepsBelow = [&] {
+        return Eigen::Vector3d(((space_.start - space_.boxMin) / grid_).array().floor());
+    };
+    const auto stepsAbove = [&] {
+        return Eigen::Vector3d(((space_.boxMax - space_.start) / grid_).array().floor());
+    };
+    while (((stepsBelow() + stepsAbove()).array() + 1).prod() > kMostNodes) {
+        grid_ *= 1.1;
+    }
+    origin_ = space_.start - grid_ * stepsBelow();
+    size_ = (stepsBelow() + stepsAbove()).cast<int>() + Eigen::Vector3i::Ones();
+    const auto count = static_cast<std::size_t>(size_.x()) * static_cast<std::size_t>(size_.y()) *
+                       static_cast<std::size_t>(size_.z());
+    distance_.resize(count);
+    const double cap = space_.clearance + 2 * grid_;
+    tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
+        const auto wall = caster_->closest(position(i), cap);
+        distance_[i] = static_cast<float>(wall ? wall->distance : cap);
+    });
+    reachable_.assign(count, 0);
+    flood(static_cast<std::size_t>(nearestNode(space_.start)));
+}
+
+Eigen::Vector3d ReachableSpace::position(std::size_t node) const {
+    const auto nx = static_cast<std::size_t>(size_.x());
+    const auto ny = static_cast<std::size_t>(size_.y());
+    return origin_ + grid_ * Eigen::Vector3d(static_cast<double>(node % nx),
+                                             static_cast<double>(node / nx % ny),
+                                             static_cast<double>(node / nx / ny));
+}
+
+std::ptrdiff_t ReachableSpace::nearestNode(const Eigen::Vector3d& place) const {
+    const Eigen::Vector3d steps = ((place - origin_) / grid_).array().round();
+    if ((steps.array() < 0).any() || (steps.array() >= size_.cast<double>().array()).any()) {
+        return -1;
+    }
+    const Eigen::Matrix<std::ptrdiff_t, 3, 1> n = steps.cast<std::ptrdiff_t>();
+    return (n.z() * size_.y() + n.y()) * size_.x() + n.x();
+}
+
+bool ReachableSpace::stepClear(std::size_t a, std::size_t b) const {
+    const auto clearance = static_cast<float>(space_.clearance);
+    if (distance_[a] < clearance || distance_[b] < clearance) {
+        return false;
+    }
+    // The distance changes by at most a metre a metre: between the two it cannot fall below this.
+    if ((distance_[a] + distance_[b] - static_cast<float>(grid_)) / 2 >= clearance) {
+        return true;
+    }
+    return caster_->sweptClear(position(a), position(b), space_.clearance);
+}
+
+void ReachableSpace::flood(std::size_t start) {
+    std::vector<std::size_t> queue{start};
+    reachable_[start] = 1;
+    const std::ptrdiff_t stride[3] = {1, size_.x(),
+                                      static_cast<std::ptrdiff_t>(size_.x()) * size_.y()};
+    for (std::size_t head = 0; head < queue.size(); ++head) {
+        const std::size_t node = queue[head];
+        for (int axis = 0; axis < 3; ++axis) {
+            const auto at = static_cast<std::ptrdiff_t>(node) / stride[axis] % size_[axis];
+            for (const int step : {-1, 1}) {
+                if (at + step < 0 || at + step >= size_[axis]) {
+                    continue;
+                }
+                const auto next = static_cast<std::size_t>(static_cast<std::ptrdiff_t>(node) +
+                                                           step * stride[axis]);
+                if (reachable_[next] == 0 && stepClear(node, next)) {
+                    reachable_[next] = 1;
+                    queue.push_back(next);
+                }
+            }
+        }
+    }
+}
+
+std::size_t ReachableSpace::reachableCount() const {
+    return static_cast<std::size_t>(std::count(reachable_.begin(), reachable_.end(), 1));
+}
+
+float ReachableSpace::margin(const Eigen::Vector3d& place) const {
+    const std::ptrdiff_t node = nearestNode(place);
+    if (node < 0 || reachable_[static_cast<std::size_t>(node)] == 0) {
+        return -std::numeric_limits<float>::infinity();
+    }
+    const auto i = static_cast<std::size_t>(node);
+    return distance_[i] - static_cast<float>((place - position(i)).norm() + space_.clearance);
+}
+
+bool ReachableSpace::contains(const Eigen::Vector3d& place) const {
+    const std::ptrdiff_t node = nearestNode(place);
+    if (node < 0 || reachable_[static_cast<std::size_t>(node)] == 0) {
+        return false;
+    }
+    return caster_->sweptClear(place, position(static_cast<std::size_t>(node)), space_.clearance);
+}
+
+}  // namespace riftmap
