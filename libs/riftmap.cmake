@@ -65,3 +65,16 @@ function(riftmap_add_tests name)
   gtest_discover_tests(test-${name} TEST_PREFIX ${name}. DISCOVERY_MODE PRE_TEST
                        PROPERTIES TIMEOUT 600 LABELS "${arg_LABELS}")
 endfunction()
+
+# riftmap_add_benchmark(NAME LINK lib ...): every *.cpp of the folder becomes bench-NAME, which
+# `./run bench NAME` starts as `bench-NAME --csv out/bench/NAME.csv` (header figure,value,unit).
+function(riftmap_add_benchmark name)
+  cmake_parse_arguments(arg "" "" "LINK" ${ARGN})
+  file(GLOB sources CONFIGURE_DEPENDS *.cpp)
+  add_executable(bench-${name} ${sources})
+  riftmap_set_compile_options(bench-${name})
+  target_include_directories(bench-${name} PRIVATE ${PROJECT_SOURCE_DIR}/tests/common)
+  target_compile_definitions(bench-${name} PRIVATE RIFTMAP_SOURCE_DIR="${PROJECT_SOURCE_DIR}"
+                                                   RIFTMAP_BINARY_DIR="${PROJECT_BINARY_DIR}")
+  target_link_libraries(bench-${name} PRIVATE ${arg_LINK})
+endfunction()

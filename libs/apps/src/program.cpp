@@ -90,6 +90,8 @@ void Program::declareCommonFlags() {
     line_.flag("no-progress", 0, noProgress_, "no progress line");
     line_.values("plugins", 'p', "A.so[,B.so]", plugins_, "shared libraries to load first");
     line_.flag("overwrite", 'w', overwrite_, "replaces results that are already there");
+    line_.flag("options-markdown", 0, markdown_,
+               "prints the options as they stand in config/README.md and ends");
     line_.flag("help", 'h', help_, "prints this and ends");
     line_.flag("version", 0, version_, "prints the version and ends");
 }
@@ -105,8 +107,10 @@ bool Program::initialize(const std::vector<std::string>& arguments) {
         command_ += " " + quoted(argument);
     }
     line_.parse(arguments);
-    if (help_ || version_) {
-        print(help_ ? helpText() : name_ + " (Riftmap) " + kVersion + "\n");
+    if (help_ || version_ || markdown_) {
+        print(help_      ? helpText()
+              : version_ ? name_ + " (Riftmap) " + kVersion + "\n"
+                         : table_.markdown());
         return false;
     }
     setMinLoggingLevel(verbosityFrom(verbosity_));
@@ -200,12 +204,6 @@ std::string Program::helpText() {
     declare();
     return name_ + ": " + purpose_ + "\n\nUsage: " + usageText() + "\n\n" + line_.help() +
            "\nOptions (in CONFIG.ini, or with --set Section.key=value):\n\n" + table_.help();
-}
-
-std::string Program::markdown() {
-    declare();
-    return "## " + name_ + "\n\n" + purpose_ + "\n\n    " + usageText() + "\n\n" +
-           table_.markdown();
 }
 
 int runProgram(Program& program, int argc, const char* const* argv) {

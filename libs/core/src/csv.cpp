@@ -55,7 +55,9 @@ std::optional<std::vector<std::string>> split(const std::string& line) {
 
 }  // namespace
 
-std::string Field::number(float value) { return toText(value); }
+std::string Field::number(float value) {
+    return toText(value);
+}
 
 std::string Field::number(double value) {
     char buffer[64];

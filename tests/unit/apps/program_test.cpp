@@ -169,6 +169,14 @@ TEST(Program, VersionIsThatOfTheBuild) {
                 MatchesRegex("riftmap-sample \\(Riftmap\\) [0-9]+\\.[0-9]+\\.[0-9]+\n"));
 }
 
+TEST(Program, OptionsAsMarkdown) {
+    const Outcome result = outcome({"--options-markdown"});
+    EXPECT_EQ(result.code, 0);
+    EXPECT_THAT(result.out, HasSubstr("### [Sample]\n\nOptions of the sample.\n"));
+    EXPECT_THAT(result.out, HasSubstr("| `length` | m | 0.5 | 0 .. 10 | A length. |\n"));
+    EXPECT_THAT(result.out, HasSubstr("| `seed` |"));
+}
+
 TEST(Program, DumpedConfigurationLoadsAgain) {
     const Outcome first = outcome({"--dump-config", "--set", "Sample.length=0.1", "--seed", "3"});
     EXPECT_EQ(first.code, 0);

@@ -39,7 +39,7 @@ class Program : public mrpt::system::COutputLogger {
 
     /// Reads the command line (argv[0] is ignored) and the configuration, loads the plug-ins and
     /// limits the threads. False when all that was asked for was text (--help, --version,
-    /// --dump-config), now on stdout. Throws ConfigError.
+    /// --options-markdown, --dump-config), now on stdout. Throws ConfigError.
     bool initialize(int argc, const char* const* argv);
     /// The same, from the arguments alone.
     bool initialize(const std::vector<std::string>& arguments);
@@ -53,8 +53,6 @@ class Program : public mrpt::system::COutputLogger {
     const OptionTable& table();
     /// What --help prints: purpose, usage, arguments, flags, options.
     std::string helpText();
-    /// For config/README.md: purpose, usage and options.
-    std::string markdown();
 
  protected:
     /// Binds the options of all parts of the program.
@@ -100,7 +98,7 @@ class Program : public mrpt::system::COutputLogger {
     std::string seedText_, threadsText_, verbosity_ = "WARN";
     std::uint64_t seed_ = 0;
     int threads_ = 0;  ///< 0 = one a core
-    bool help_ = false, version_ = false, dumpConfig_ = false;
+    bool help_ = false, version_ = false, markdown_ = false, dumpConfig_ = false;
     bool overwrite_ = false, noProgress_ = false;
     std::shared_ptr<void> threadLimit_;  ///< a tbb::global_control
 };
