@@ -2,6 +2,7 @@
 #include "riftmap/sim/ray_caster.h"
 
 #include <embree3/rtcore.h>
+#include <tbb/global_control.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -12,9 +13,10 @@
 namespace riftmap {
 namespace {
 
-// One thread builds the tree, and one instruction set walks it: which of two triangles with a
-// common edge a ray through that edge hits then does not depend on the machine.
-constexpr const char* kDeviceConfig = "threads=1,isa=sse4.2";
+// One instruction set walks the tree, and (see Scene) one thread builds it: which of two triangles
+// a ray through their common edge hits then does not depend on the machine. `threads` would limit
+// TBB for the whole process: more than any machine has means no limit.
+constexpr const char* kDeviceConfig = "threads=4096,isa=sse4.2";
 
 std::string describe(RTCError error) {
     switch (error) {
@@ -69,7 +71,7 @@ struct RayCaster::Scene {
         rtcCommitGeometry(geometry);
         rtcAttachGeometry(scene, geometry);
         rtcReleaseGeometry(geometry);
-        rtcCommitScene(scene);
+        commitWithOneThread();
         if (const RTCError error = rtcGetDeviceError(device); error != RTC_ERROR_NONE) {
             release();
             throw MeshError("ray caster: " + riftmap::describe(error));
@@ -78,6 +80,11 @@ struct RayCaster::Scene {
     ~Scene() { release(); }
     Scene(const Scene&) = delete;
     Scene& operator=(const Scene&) = delete;
+
+    void commitWithOneThread() {
+        const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+        rtcCommitScene(scene);
+    }
 
     void release() {
         rtcReleaseScene(scene);
@@ -104,6 +111,30 @@ RayCaster::~RayCaster() = default;
 RayCaster::RayCaster(RayCaster&&) noexcept = default;
 RayCaster& RayCaster::operator=(RayCaster&&) noexcept = default;
 
+namespace {
+
+/// What Embree found, made exact: its t is in single precision; the plane gives it in double.
+Hit makeHit(const Triangle& c, const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
+            std::uint32_t triangle, float t, float u, float v) {
+    Hit hit;
+    hit.triangle = triangle;
+    hit.u = u;
+    hit.v = v;
+    hit.t = static_cast<double>(t);
+    const Eigen::Vector3d n = (c[1] - c[0]).cross(c[2] - c[0]);
+    const double length = n.norm();
+    if (length > 0) {
+        hit.normal = n / length;
+        const double slope = hit.normal.dot(direction);
+        if (std::abs(slope) > 1e-6 * direction.norm()) {
+            hit.t = hit.normal.dot(c[0] - origin) / slope;
+        }
+    }
+    return hit;
+}
+
+}  // namespace
+
 std::optional<Hit> RayCaster::cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
                                    double tMax) const {
     RTCIntersectContext context;
@@ -117,23 +148,41 @@ std::optional<Hit> RayCaster::cast(const Eigen::Vector3d& origin, const Eigen::V
     if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) {
         return std::nullopt;
     }
-    Hit hit;
-    hit.triangle = query.hit.primID;
-    hit.u = query.hit.u;
-    hit.v = query.hit.v;
-    hit.t = static_cast<double>(query.ray.tfar);
-    const Triangle c = scene_->corners(hit.triangle);
-    const Eigen::Vector3d n = (c[1] - c[0]).cross(c[2] - c[0]);
-    const double length = n.norm();
-    if (length > 0) {
-        hit.normal = n / length;
-        // Embree's t is in single precision; the plane gives it in double.
-        const double slope = hit.normal.dot(direction);
-        if (std::abs(slope) > 1e-6 * direction.norm()) {
-            hit.t = hit.normal.dot(c[0] - origin) / slope;
+    return makeHit(scene_->corners(query.hit.primID), origin, direction, query.hit.primID,
+                   query.ray.tfar, query.hit.u, query.hit.v);
+}
+
+void RayCaster::cast4(const Eigen::Vector3d& origin, const Eigen::Vector3d* directions,
+                      std::size_t count, std::optional<Hit>* hits) const {
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+    alignas(16) RTCRayHit4 query{};
+    alignas(16) int valid[4];
+    for (std::size_t i = 0; i < 4; ++i) {
+        valid[i] = i < count ? -1 : 0;
+        const Eigen::Vector3d& d = directions[std::min(i, count - 1)];
+        query.ray.org_x[i] = static_cast<float>(origin.x());
+        query.ray.org_y[i] = static_cast<float>(origin.y());
+        query.ray.org_z[i] = static_cast<float>(origin.z());
+        query.ray.dir_x[i] = static_cast<float>(d.x());
+        query.ray.dir_y[i] = static_cast<float>(d.y());
+        query.ray.dir_z[i] = static_cast<float>(d.z());
+        query.ray.tfar[i] = std::numeric_limits<float>::infinity();
+        query.ray.mask[i] = ~0U;
+        query.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
+        query.hit.primID[i] = RTC_INVALID_GEOMETRY_ID;
+        query.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+    }
+    rtcIntersect4(valid, scene_->scene, &context, &query);
+    for (std::size_t i = 0; i < count; ++i) {
+        hits[i].reset();
+        if (query.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID) {
+            hits[i] =
+                makeHit(scene_->corners(query.hit.primID[i]), origin, directions[i],
+                        query.hit.primID[i], query.ray.tfar[i], query.hit.u[i], query.hit.v[i]);
         }
     }
-    return hit;
 }
 
 bool RayCaster::occluded(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double margin) const {

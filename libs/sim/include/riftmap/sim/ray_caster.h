@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <memory>
@@ -41,6 +42,12 @@ class RayCaster {
     /// need not have unit length: with one of z = 1 in a camera's frame, t is the depth.
     std::optional<Hit> cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
                             double tMax = std::numeric_limits<double>::infinity()) const;
+
+    /// The same for up to four rays from one origin (1 <= count <= 4) that run side by side, as
+    /// those of neighbouring pixels do: about twice as fast. Where a ray runs exactly through an
+    /// edge it may name the other triangle than `cast`.
+    void cast4(const Eigen::Vector3d& origin, const Eigen::Vector3d* directions, std::size_t count,
+               std::optional<Hit>* hits) const;
 
     /// True if a surface lies strictly between a and b. Surfaces within `margin` [m] of either end
     /// do not count, so that a point on the surface does not hide itself.
