@@ -14,81 +14,6 @@
 namespace riftmap {
 namespace {
 
-// ---- Noise -------------------------------------------------------------------------------------
-
-constexpr int kTable = 256;
-constexpr int kMostOctaves = 14;
-
-struct NoiseTables {
-    std::array<std::uint8_t, 2 * kTable> permutation{};  // twice, so that sums need no wrap
-    std::array<float, kTable> value{};
-    std::array<Eigen::Matrix3f, kMostOctaves> rotation;
-
-    NoiseTables() {
-        for (std::size_t i = 0; i < kTable; ++i) {
-            permutation[i] = static_cast<std::uint8_t>(i);
-            value[i] = (static_cast<float>(i) - 127.5F) / 127.5F;
-        }
-        for (std::size_t i = kTable - 1; i > 0; --i) {
-            std::swap(permutation[i], permutation[mixBits(42, i) % (i + 1)]);
-        }
-        std::copy_n(permutation.begin(), kTable, permutation.begin() + kTable);
-        // Each octave's lattice is turned another way: no lines along walls. Rational rotations
-        // from unit quaternions, without the mathematics library.
-        for (std::size_t i = 0; i < kMostOctaves; ++i) {
-            const auto part = [&](std::uint64_t k) {
-                return static_cast<double>(mixBits(i, k) % 2001) / 1000.0 - 1.0;
-            };
-            rotation[i] = Eigen::Quaterniond(1.0 + std::abs(part(0)), part(1), part(2), part(3))
-                              .normalized()
-                              .toRotationMatrix()
-                              .cast<float>();
-        }
-    }
-};
-
-const NoiseTables& tables() {
-    static const NoiseTables instance;
-    return instance;
-}
-
-float smooth(float t) {
-    return t * t * (3 - 2 * t);
-}
-
-/// Value noise on the unit lattice.
-float valueNoise(const Eigen::Vector3f& p) {
-    const NoiseTables& n = tables();
-    std::array<int, 3> cell;
-    std::array<float, 3> w;
-    for (int k = 0; k < 3; ++k) {
-        const float x = p[k];
-        int i = static_cast<int>(x);
-        i -= static_cast<float>(i) > x ? 1 : 0;
-        cell[static_cast<std::size_t>(k)] = i & (kTable - 1);
-        w[static_cast<std::size_t>(k)] = smooth(x - static_cast<float>(i));
-    }
-    const auto at = [](int i) { return static_cast<std::size_t>(i); };
-    const auto& permutation = n.permutation;
-    const int x0 = permutation[at(cell[0])];
-    const int x1 = permutation[at(cell[0] + 1)];
-    const int y0 = cell[1];
-    const int y1 = (cell[1] + 1) & (kTable - 1);
-    const auto column = [&](int x, int y) {
-        const int base = permutation[at(x + y)];
-        const float low = n.value[permutation[at(base + cell[2])]];
-        const float high = n.value[permutation[at(base + ((cell[2] + 1) & (kTable - 1)))]];
-        return low + w[2] * (high - low);
-    };
-    const float a = column(x0, y0);
-    const float b = column(x1, y0);
-    const float c = column(x0, y1);
-    const float d = column(x1, y1);
-    const float front = a + w[0] * (b - a);
-    const float back = c + w[0] * (d - c);
-    return front + w[1] * (back - front);
-}
-
 // ---- Patterns ----------------------------------------------------------------------------------
 
 /// Coverage of a joint of this width [m] at distance `d` from its middle, for a pixel this large.
@@ -148,23 +73,6 @@ float patternAt(const Material& m, const Eigen::Vector3f& p, const Eigen::Vector
 }
 
 }  // namespace
-
-float solidNoise(const Eigen::Vector3f& point, float size, float footprint) {
-    constexpr float kContrast = 0.24F;  // an octave
-    float sum = 0;
-    float wavelength = size;
-    for (std::size_t octave = 0; octave < kMostOctaves; ++octave) {
-        // Fades out from four pixels a blotch to one and a half: below, it would flicker.
-        const float resolved = (wavelength / footprint - 1.5F) / 2.5F;
-        if (resolved <= 0) {
-            break;
-        }
-        const Eigen::Vector3f p = tables().rotation[octave] * point * (1 / wavelength);
-        sum += std::min(1.0F, resolved) * kContrast * valueNoise(p);
-        wavelength *= 0.5F;
-    }
-    return sum;
-}
 
 // ---- Mip maps ----------------------------------------------------------------------------------
 
@@ -308,8 +216,8 @@ Eigen::Vector3f Appearance::shadingNormal(const Hit& hit) const {
     return length > 0 ? Eigen::Vector3f(sum / length) : n[0];
 }
 
-Eigen::Vector3f Appearance::colour(const Hit& hit, const Eigen::Vector3f& point, float footprint,
-                                   bool withNoise) const {
+Eigen::Vector3f Appearance::colour(const Hit& hit, const Eigen::Vector3f& point,
+                                   float footprint) const {
     const std::uint32_t index = materialOf(hit.triangle);
     const Material& material = materials_[index];
     const auto& corner = mesh_.triangles[hit.triangle];
@@ -325,13 +233,12 @@ Eigen::Vector3f Appearance::colour(const Hit& hit, const Eigen::Vector3f& point,
         colour =
             colour.cwiseProduct(w * c[corner[0]] + hit.u * c[corner[1]] + hit.v * c[corner[2]]);
     }
-    colour *= patternAt(material, point, hit.normal, footprint);
-    if (withNoise && material.noise > 0) {
-        const float n =
-            solidNoise(point.cwiseQuotient(material.grain), material.noiseSize, footprint);
-        colour *= std::clamp(1 + material.noise * n, 0.12F, 2.0F);
-    }
-    return colour;
+    return colour * patternAt(material, point, hit.normal, footprint);
+}
+
+const Material* Appearance::noiseOf(std::uint32_t triangle) const {
+    const std::uint32_t index = materialOf(triangle);
+    return textures_[index].empty() && materials_[index].noise > 0 ? &materials_[index] : nullptr;
 }
 
 }  // namespace riftmap

@@ -29,19 +29,16 @@ class MipMap {
     std::vector<cv::Mat> levels_;
 };
 
-/// Band-limited solid noise: octaves of equal contrast, as in natural scenes, so that there is
-/// something to match at any distance. About -1 .. 1, mean 0. `size`: of the coarsest blotches [m];
-/// `footprint`: of the pixel [m].
-float solidNoise(const Eigen::Vector3f& point, float size, float footprint);
-
 /// Not thread-safe to build, then const and thread-safe.
 class Appearance {
  public:
     explicit Appearance(const TriangleMesh& mesh);
 
-    /// Unlit colour, red green blue in 0 .. 1. `footprint`: side of the pixel on the surface [m].
-    Eigen::Vector3f colour(const Hit& hit, const Eigen::Vector3f& point, float footprint,
-                           bool withNoise) const;
+    /// Unlit colour before noise, red green blue in 0 .. 1. `footprint`: side of the pixel on the
+    /// surface [m].
+    Eigen::Vector3f colour(const Hit& hit, const Eigen::Vector3f& point, float footprint) const;
+    /// The material whose noise lies over this triangle; null if there is a texture or no noise.
+    const Material* noiseOf(std::uint32_t triangle) const;
     /// Normal of the front side for shading: smooth where the surface is curved, not over creases.
     Eigen::Vector3f shadingNormal(const Hit& hit) const;
     std::uint32_t materialOf(std::uint32_t triangle) const {

@@ -58,6 +58,10 @@ RTCRay makeRay(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, 
 
 struct RayCaster::Scene {
     explicit Scene(const TriangleMesh& mesh) : vertices(mesh.vertices), triangles(mesh.triangles) {
+        normals.reserve(triangles.size());
+        for (std::size_t i = 0; i < triangles.size(); ++i) {
+            normals.push_back(mesh.normal(i));
+        }
         device = checked(rtcNewDevice(kDeviceConfig));
         scene = checked(rtcNewScene(device));
         rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
@@ -97,6 +101,11 @@ struct RayCaster::Scene {
                 vertices[t[2]].cast<double>()};
     }
 
+    Eigen::Vector3d corner(std::uint32_t triangle) const {
+        return vertices[triangles[triangle][0]].cast<double>();
+    }
+
+    std::vector<Eigen::Vector3d> normals;  ///< a triangle
     std::vector<Eigen::Vector3f> vertices;
     std::vector<std::array<std::uint32_t, 3>> triangles;
     RTCDevice device = nullptr;
@@ -114,21 +123,18 @@ RayCaster& RayCaster::operator=(RayCaster&&) noexcept = default;
 namespace {
 
 /// What Embree found, made exact: its t is in single precision; the plane gives it in double.
-Hit makeHit(const Triangle& c, const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
-            std::uint32_t triangle, float t, float u, float v) {
+Hit makeHit(const Eigen::Vector3d& corner, const Eigen::Vector3d& normal,
+            const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, std::uint32_t triangle,
+            float t, float u, float v) {
     Hit hit;
     hit.triangle = triangle;
     hit.u = u;
     hit.v = v;
     hit.t = static_cast<double>(t);
-    const Eigen::Vector3d n = (c[1] - c[0]).cross(c[2] - c[0]);
-    const double length = n.norm();
-    if (length > 0) {
-        hit.normal = n / length;
-        const double slope = hit.normal.dot(direction);
-        if (std::abs(slope) > 1e-6 * direction.norm()) {
-            hit.t = hit.normal.dot(c[0] - origin) / slope;
-        }
+    hit.normal = normal;  // zero for a triangle without area
+    const double slope = normal.dot(direction);
+    if (slope * slope > 1e-12 * direction.squaredNorm()) {
+        hit.t = normal.dot(corner - origin) / slope;
     }
     return hit;
 }
@@ -148,8 +154,8 @@ std::optional<Hit> RayCaster::cast(const Eigen::Vector3d& origin, const Eigen::V
     if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) {
         return std::nullopt;
     }
-    return makeHit(scene_->corners(query.hit.primID), origin, direction, query.hit.primID,
-                   query.ray.tfar, query.hit.u, query.hit.v);
+    return makeHit(scene_->corner(query.hit.primID), scene_->normals[query.hit.primID], origin,
+                   direction, query.hit.primID, query.ray.tfar, query.hit.u, query.hit.v);
 }
 
 void RayCaster::cast4(const Eigen::Vector3d& origin, const Eigen::Vector3d* directions,
@@ -179,8 +185,9 @@ void RayCaster::cast4(const Eigen::Vector3d& origin, const Eigen::Vector3d* dire
         hits[i].reset();
         if (query.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID) {
             hits[i] =
-                makeHit(scene_->corners(query.hit.primID[i]), origin, directions[i],
-                        query.hit.primID[i], query.ray.tfar[i], query.hit.u[i], query.hit.v[i]);
+                makeHit(scene_->corner(query.hit.primID[i]), scene_->normals[query.hit.primID[i]],
+                        origin, directions[i], query.hit.primID[i], query.ray.tfar[i],
+                        query.hit.u[i], query.hit.v[i]);
         }
     }
 }

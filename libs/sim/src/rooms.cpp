@@ -90,9 +90,13 @@ void addBooks(MeshBuilder& b, const Point& corner, int count, double lean) {
     for (int i = 0; i < count; ++i) {
         const double thickness = 0.025 + 0.012 * ((i * 7) % 4);
         const double height = 0.20 + 0.02 * ((i * 5) % 4);
-        Material m = paint("book", 0.30F + 0.15F * static_cast<float>(i % 4),
-                           0.25F + 0.2F * static_cast<float>((i * 3) % 3),
-                           0.30F + 0.12F * static_cast<float>((i * 2) % 5));
+        const Eigen::Vector3f covers[] = {{0.62F, 0.22F, 0.18F},
+                                          {0.25F, 0.40F, 0.30F},
+                                          {0.72F, 0.62F, 0.42F},
+                                          {0.24F, 0.30F, 0.48F},
+                                          {0.50F, 0.36F, 0.24F}};
+        const Eigen::Vector3f& cover = covers[(i * 3 + count) % 5];
+        Material m = paint("book", cover.x(), cover.y(), cover.z());
         m.noiseSize = 0.15F;
         b.material(m);
         b.box(corner + Point(x, 0, 0), corner + Point(x + thickness, 0.17 - lean * (i % 3), height),

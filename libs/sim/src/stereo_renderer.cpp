@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "riftmap/sim/stereo_renderer.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -11,6 +8,8 @@
 
 #include "appearance.h"
 #include "random_bits.h"
+#include "riftmap/core/parallel.h"
+#include "solid_noise.h"
 
 namespace riftmap {
 namespace {
@@ -20,23 +19,36 @@ using Point = Eigen::Vector3d;
 constexpr std::uint32_t kNoTriangle = ~0U;
 constexpr float kSky = 0.80F;
 
-template <class Body>
-void forEachRow(int rows, const Body& body) {
-    tbb::parallel_for(tbb::blocked_range<int>(0, rows, 4), [&](const tbb::blocked_range<int>& r) {
-        for (int row = r.begin(); row != r.end(); ++row) {
-            body(row);
-        }
-    });
-}
-
 /// What the ray through a pixel's centre met.
 struct PixelHit {
     float depth = std::numeric_limits<float>::infinity();
     std::uint32_t triangle = kNoTriangle;
     std::uint32_t material = 0;
-    Eigen::Vector3f normal = Eigen::Vector3f::Zero();  ///< of the triangle
-    Eigen::Vector3f shading = Eigen::Vector3f::Zero();
+    Eigen::Vector3f shading = Eigen::Vector3f::Zero();  ///< normal towards the camera
 };
+
+/// Rays that are traced and coloured together, and what became of them.
+struct Batch {
+    std::vector<Eigen::Vector2d> pixels;  ///< (column, row)
+    std::vector<Point> rays;              ///< directions, world frame
+    std::vector<std::optional<Hit>> hits;
+    std::vector<PixelHit> seen;
+    std::vector<Eigen::Vector3f> colours;  ///< lit
+    NoiseQueries queries;
+    std::vector<std::pair<std::size_t, float>> noisy;  ///< index of the pixel, strength
+    std::vector<float> noise;
+};
+
+/// Calls body(row, scratch) for all rows, several at once.
+template <class Body>
+void forEachRow(int rows, const Body& body) {
+    parallelFor(static_cast<std::size_t>(rows), 4, [&](std::size_t begin, std::size_t end) {
+        Batch scratch;
+        for (std::size_t row = begin; row < end; ++row) {
+            body(static_cast<int>(row), scratch);
+        }
+    });
+}
 
 }  // namespace
 
@@ -104,18 +116,18 @@ struct StereoRenderer::Parts {
     }
     Point undistort(const Point& seen) const;
 
-    std::optional<Hit> castPixel(const Pose& pose, double column, double row) const {
-        return caster.cast(pose.translation, pose.rotation * direction(column, row));
-    }
     /// Side of a pixel on the surface [m]; the geometric mean of both ways on an inclined one.
     float footprint(const Hit& hit, const Point& ray) const {
         const double cosine = std::abs(hit.normal.dot(ray)) / ray.norm();
         return static_cast<float>(hit.t / camera.fx / std::sqrt(std::max(0.1, cosine)));
     }
     float light(const Eigen::Vector3f& normal) const;
-    Eigen::Vector3f shade(const Pose& pose, double column, double row, bool withNoise,
-                          PixelHit* pixel) const;
+    void shade(const Pose& pose, Batch& batch, bool withNoise) const;
+    void cast(const Pose& pose, Batch& batch) const;
+    void castRow(const Pose& pose, int row, Batch& batch) const;
     bool onEdge(const std::vector<PixelHit>& hits, int column, int row) const;
+    void smoothEdges(const Pose& pose, const std::vector<PixelHit>& seen, int row,
+                     Eigen::Vector3f* line, Batch& batch) const;
     cv::Mat render(const Pose& pose, std::uint64_t noiseSeed) const;
     void expose(const Eigen::Vector3f& colour, int column, int row, std::uint64_t noiseSeed,
                 bool sensor, cv::Mat& image) const;
@@ -148,32 +160,63 @@ float StereoRenderer::Parts::light(const Eigen::Vector3f& normal) const {
     static const Eigen::Vector3f kKey = Eigen::Vector3f(0.48F, 0.36F, 0.80F);
     static const Eigen::Vector3f kFill = Eigen::Vector3f(-0.64F, -0.48F, 0.60F);
     const auto ambient = static_cast<float>(options.ambient);
-    const float sky = 0.75F + 0.25F * normal.z();
-    return ambient * sky + (1 - ambient) * (0.62F * std::max(0.0F, normal.dot(kKey)) +
-                                            0.42F * std::max(0.0F, normal.dot(kFill)) + 0.18F);
+    const float sky = 0.88F + 0.12F * normal.z();
+    return ambient * sky + (1 - ambient) * (0.55F * std::max(0.0F, normal.dot(kKey)) +
+                                            0.36F * std::max(0.0F, normal.dot(kFill)) + 0.32F);
 }
 
-/// Colour seen in one direction; fills `pixel` if it is not null.
-Eigen::Vector3f StereoRenderer::Parts::shade(const Pose& pose, double column, double row,
-                                             bool withNoise, PixelHit* pixel) const {
-    const Point ray = pose.rotation * direction(column, row);
-    const auto hit = caster.cast(pose.translation, ray);
-    if (!hit) {
-        return Eigen::Vector3f(0.92F, 0.97F, 1.05F) * kSky;
+void StereoRenderer::Parts::cast(const Pose& pose, Batch& b) const {
+    const std::size_t n = b.pixels.size();
+    b.rays.resize(n);
+    b.hits.resize(n);
+    for (std::size_t i = 0; i < n; ++i) {
+        b.rays[i] = pose.rotation * direction(b.pixels[i].x(), b.pixels[i].y());
     }
-    const Eigen::Vector3f point = (pose.translation + hit->t * ray).cast<float>();
-    Eigen::Vector3f normal = appearance.shadingNormal(*hit);
-    if (hit->normal.dot(ray) > 0) {  // seen from behind
-        normal = -normal;
+    for (std::size_t i = 0; i < n; i += 4) {
+        caster.cast4(pose.translation, &b.rays[i], std::min<std::size_t>(4, n - i), &b.hits[i]);
     }
-    if (pixel != nullptr) {
-        pixel->depth = static_cast<float>(hit->t);
-        pixel->triangle = hit->triangle;
-        pixel->material = appearance.materialOf(hit->triangle);
-        pixel->normal = hit->normal.cast<float>();
-        pixel->shading = normal;
+}
+
+/// Finds the colours of the batch's pixels after cast().
+void StereoRenderer::Parts::shade(const Pose& pose, Batch& b, bool withNoise) const {
+    const std::size_t n = b.pixels.size();
+    b.seen.assign(n, PixelHit());
+    b.colours.assign(n, Eigen::Vector3f(0.92F, 0.97F, 1.05F) * kSky);
+    b.queries.clear();
+    b.noisy.clear();
+    for (std::size_t i = 0; i < n; ++i) {
+        if (!b.hits[i]) {
+            continue;
+        }
+        const Hit& hit = *b.hits[i];
+        const Eigen::Vector3f point = (pose.translation + hit.t * b.rays[i]).cast<float>();
+        const float size = footprint(hit, b.rays[i]);
+        Eigen::Vector3f normal = appearance.shadingNormal(hit);
+        if (hit.normal.dot(b.rays[i]) > 0) {  // seen from behind
+            normal = -normal;
+        }
+        b.seen[i] = {static_cast<float>(hit.t), hit.triangle, appearance.materialOf(hit.triangle),
+                     normal};
+        b.colours[i] = appearance.colour(hit, point, size) * light(normal);
+        const Material* material = withNoise ? appearance.noiseOf(hit.triangle) : nullptr;
+        if (material != nullptr) {
+            b.queries.add(point.cwiseQuotient(material->grain), material->noiseSize, size);
+            b.noisy.push_back({i, material->noise});
+        }
     }
-    return appearance.colour(*hit, point, footprint(*hit, ray), withNoise) * light(normal);
+    solidNoise(b.queries, b.noise);
+    for (std::size_t k = 0; k < b.noisy.size(); ++k) {
+        const auto& [i, strength] = b.noisy[k];
+        b.colours[i] *= std::clamp(1 + strength * b.noise[k], 0.12F, 2.0F);
+    }
+}
+
+void StereoRenderer::Parts::castRow(const Pose& pose, int row, Batch& b) const {
+    b.pixels.clear();
+    for (int column = 0; column < camera.width; ++column) {
+        b.pixels.emplace_back(column, row);
+    }
+    cast(pose, b);
 }
 
 /// True if a neighbour sees another surface than this pixel.
@@ -235,35 +278,57 @@ void StereoRenderer::Parts::expose(const Eigen::Vector3f& colour, int column, in
 
 cv::Mat StereoRenderer::Parts::render(const Pose& pose, std::uint64_t noiseSeed) const {
     const auto width = static_cast<std::size_t>(camera.width);
-    std::vector<PixelHit> hits(width * static_cast<std::size_t>(camera.height));
-    std::vector<Eigen::Vector3f> colours(hits.size());
-    forEachRow(camera.height, [&](int row) {
-        for (int column = 0; column < camera.width; ++column) {
-            const std::size_t i =
-                static_cast<std::size_t>(row) * width + static_cast<std::size_t>(column);
-            colours[i] = shade(pose, column, row, true, &hits[i]);
-        }
+    std::vector<PixelHit> seen(width * static_cast<std::size_t>(camera.height));
+    std::vector<Eigen::Vector3f> colours(seen.size());
+    forEachRow(camera.height, [&](int row, Batch& b) {
+        castRow(pose, row, b);
+        shade(pose, b, true);
+        const auto first = static_cast<std::ptrdiff_t>(static_cast<std::size_t>(row) * width);
+        std::copy(b.seen.begin(), b.seen.end(), seen.begin() + first);
+        std::copy(b.colours.begin(), b.colours.end(), colours.begin() + first);
     });
     cv::Mat image(camera.height, camera.width, options.colour ? CV_8UC3 : CV_8UC1);
-    const int n = options.edgeSamples;
-    forEachRow(camera.height, [&](int row) {
+    forEachRow(camera.height, [&](int row, Batch& b) {
+        Eigen::Vector3f* line = &colours[static_cast<std::size_t>(row) * width];
+        smoothEdges(pose, seen, row, line, b);
         for (int column = 0; column < camera.width; ++column) {
-            const std::size_t i =
-                static_cast<std::size_t>(row) * width + static_cast<std::size_t>(column);
-            Eigen::Vector3f colour = colours[i];
-            if (n > 1 && onEdge(hits, column, row)) {
-                colour.setZero();
-                for (int k = 0; k < n * n; ++k) {
-                    const double dx = (k % n + 0.5) / n - 0.5;
-                    const double dy = (k / n + 0.5) / n - 0.5;
-                    colour += shade(pose, column + dx, row + dy, true, nullptr);
-                }
-                colour /= static_cast<float>(n * n);
-            }
-            expose(colour, column, row, noiseSeed, true, image);
+            expose(line[column], column, row, noiseSeed, true, image);
         }
     });
     return image;
+}
+
+/// Pixels of this row that see several surfaces get the mean of n x n rays.
+void StereoRenderer::Parts::smoothEdges(const Pose& pose, const std::vector<PixelHit>& seen,
+                                        int row, Eigen::Vector3f* line, Batch& b) const {
+    const int n = options.edgeSamples;
+    if (n < 2) {
+        return;
+    }
+    std::vector<int> columns;
+    b.pixels.clear();
+    for (int column = 0; column < camera.width; ++column) {
+        if (onEdge(seen, column, row)) {
+            columns.push_back(column);
+            for (int k = 0; k < n * n; ++k) {
+                b.pixels.emplace_back(column + (k % n + 0.5) / n - 0.5,
+                                      row + (k / n + 0.5) / n - 0.5);
+            }
+        }
+    }
+    if (columns.empty()) {
+        return;
+    }
+    cast(pose, b);
+    shade(pose, b, true);
+    const auto samples = static_cast<std::size_t>(n * n);
+    for (std::size_t i = 0; i < columns.size(); ++i) {
+        Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+        for (std::size_t k = 0; k < samples; ++k) {
+            sum += b.colours[i * samples + k];
+        }
+        line[columns[i]] = sum / static_cast<float>(samples);
+    }
 }
 
 bool StereoRenderer::Parts::hiddenFromRight(const Pose& left, const Point& inCamera,
@@ -300,11 +365,12 @@ Truth StereoRenderer::truth(const Pose& world_T_left, bool withNormals,
     if (withHalfOcclusion) {
         truth.halfOccluded = cv::Mat::zeros(camera_.height, camera_.width, CV_8UC1);
     }
-    forEachRow(camera_.height, [&](int row) {
+    forEachRow(camera_.height, [&](int row, Batch& b) {
+        parts_->castRow(world_T_left, row, b);
         for (int column = 0; column < camera_.width; ++column) {
             const Point inCamera = parts_->direction(column, row);
-            const Point ray = world_T_left.rotation * inCamera;
-            const auto hit = parts_->caster.cast(world_T_left.translation, ray);
+            const Point& ray = b.rays[static_cast<std::size_t>(column)];
+            const auto& hit = b.hits[static_cast<std::size_t>(column)];
             truth.depth.ptr<float>(row)[column] =
                 hit ? static_cast<float>(hit->t) : std::numeric_limits<float>::infinity();
             if (!hit) {
@@ -328,10 +394,12 @@ Truth StereoRenderer::truth(const Pose& world_T_left, bool withNormals,
 
 cv::Mat StereoRenderer::renderQuick(const Pose& world_T_left) const {
     cv::Mat image(camera_.height, camera_.width, parts_->options.colour ? CV_8UC3 : CV_8UC1);
-    forEachRow(camera_.height, [&](int row) {
+    forEachRow(camera_.height, [&](int row, Batch& b) {
+        parts_->castRow(world_T_left, row, b);
+        parts_->shade(world_T_left, b, false);
         for (int column = 0; column < camera_.width; ++column) {
-            parts_->expose(parts_->shade(world_T_left, column, row, false, nullptr), column, row, 0,
-                           false, image);
+            parts_->expose(b.colours[static_cast<std::size_t>(column)], column, row, 0, false,
+                           image);
         }
     });
     return image;
