@@ -1,0 +1,240 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Where the vertices and edges lie: spatial blocks that own pages of 64 vertices. Part of the
+// public headers only so that visitors inline; use it through PixelGraph.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "riftmap/graph/compact.h"
+
+namespace riftmap {
+
+/// Names a vertex of a PixelGraph; stays valid until that vertex is deleted.
+using VertexId = std::uint32_t;
+inline constexpr VertexId kNoVertex = 0xFFFFFFFFU;
+
+/// Bits of a vertex that are not part of what a reader asks for.
+enum VertexState : std::uint8_t {
+    kSurrounded = 1,       ///< some view had all four pixel neighbours valid and near
+    kFineEnough = 2,       ///< some view sampled it as densely as asked for
+    kOverflow = 4,         ///< the last inline edge slot names an EdgeChunk
+    kEvidenceShift = 3,    ///< 3 bits: how strongly views saw through it
+    kEvidenceMask = 0x38,  ///<
+};
+
+/// 64 vertices of one block as arrays.
+struct Page {
+    static constexpr std::uint32_t kSize = 64;
+    static constexpr std::uint32_t kInline = 4;  ///< half-edges stored beside the vertex
+
+    std::array<float, kSize> x{}, y{}, z{};     ///< map frame [m]
+    std::array<std::uint32_t, kSize> normal{};  ///< compact::encodeDirection
+    std::array<std::uint16_t, kSize> sigma{};   ///< compact::Sigma
+    std::array<std::uint16_t, kSize> area{};    ///< compact::Area
+    std::array<std::array<std::uint8_t, 3>, kSize> rgb{};
+    std::array<std::uint8_t, kSize> open{};   ///< OpenKind
+    std::array<std::uint8_t, kSize> state{};  ///< VertexState
+    std::array<std::array<VertexId, kInline>, kSize> neighbour{};
+    std::array<std::array<std::uint16_t, kInline>, kSize> weight{};
+
+    std::uint64_t alive = 0;            ///< a bit a slot
+    std::uint32_t block = 0xFFFFFFFFU;  ///< index of its block
+    std::array<float, 3> min{}, max{};  ///< bounds of its living vertices [m]
+
+    Eigen::Vector3f position(std::uint32_t slot) const { return {x[slot], y[slot], z[slot]}; }
+    bool living(std::uint32_t slot) const { return ((alive >> slot) & 1U) != 0; }
+    /// Bounds from scratch.
+    void updateBounds();
+};
+
+/// A cube of space and the pages that hold its vertices.
+struct Block {
+    std::array<std::int32_t, 3> key{};  ///< floor(position / blockSize) at creation of a vertex
+    std::array<float, 3> min{}, max{};  ///< bounds of its vertices [m]; fusion may leave the cube
+    std::vector<std::uint32_t> pages;   ///< ascending in age
+    std::uint32_t vertices = 0;
+};
+
+/// Further half-edges of a vertex that has more than fit inline.
+struct EdgeChunk {
+    static constexpr std::uint32_t kSize = 6;
+    static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
+    std::array<VertexId, kSize> neighbour{};
+    std::array<std::uint16_t, kSize> weight{};
+    std::uint32_t next = kNone;
+};
+
+/// Calls f(page index, slot) for each set bit of a page's mask.
+template <class F>
+void forEachBit(std::uint64_t mask, F&& f) {
+    while (mask != 0) {
+        f(static_cast<std::uint32_t>(std::countr_zero(mask)));
+        mask &= mask - 1;
+    }
+}
+
+/// Vertices, edges and the hash of blocks. Reading is thread-safe while nothing writes; methods
+/// marked (parallel) may run at the same time on different vertices.
+class GraphStorage {
+ public:
+    explicit GraphStorage(double blockSize);
+    GraphStorage(const GraphStorage& other);
+    GraphStorage& operator=(const GraphStorage&) = delete;
+    ~GraphStorage() = default;
+
+    static std::uint32_t pageOf(VertexId id) { return id / Page::kSize; }
+    static std::uint32_t slotOf(VertexId id) { return id % Page::kSize; }
+    static VertexId idOf(std::uint32_t page, std::uint32_t slot) {
+        return page * Page::kSize + slot;
+    }
+
+    std::uint32_t pageCount() const { return pageCount_; }
+    Page& page(std::uint32_t index) {
+        return (*chunks_[index / kPagesPerChunk])[index % kPagesPerChunk];
+    }
+    const Page& page(std::uint32_t index) const {
+        return (*chunks_[index / kPagesPerChunk])[index % kPagesPerChunk];
+    }
+    const std::vector<Block>& blocks() const { return blocks_; }
+    std::vector<Block>& blocks() { return blocks_; }
+    double blockSize() const { return blockSize_; }
+
+    bool alive(VertexId id) const {
+        return pageOf(id) < pageCount_ && page(pageOf(id)).living(slotOf(id));
+    }
+    Eigen::Vector3f position(VertexId id) const { return page(pageOf(id)).position(slotOf(id)); }
+
+    std::array<std::int32_t, 3> keyOf(const Eigen::Vector3f& p) const;
+    /// Index of the block with this key; made if there is none.
+    std::uint32_t blockAt(const std::array<std::int32_t, 3>& key);
+    /// Index of the block with this key, or kNoBlock.
+    std::uint32_t findBlock(const std::array<std::int32_t, 3>& key) const;
+    static constexpr std::uint32_t kNoBlock = 0xFFFFFFFFU;
+
+    /// A living vertex without edges; the caller fills the arrays. Reuses freed slots.
+    VertexId addVertex(std::uint32_t block);
+    /// Deletes a vertex with its edges.
+    void removeVertex(VertexId id);
+    /// Recomputes the bounds of a block from those of its pages.
+    void updateBounds(std::uint32_t block);
+
+    /// Where the weight code of edge a-b is stored at a; nullptr if there is none.
+    std::uint16_t* findHalfEdge(VertexId a, VertexId b);
+    const std::uint16_t* findHalfEdge(VertexId a, VertexId b) const {
+        return const_cast<GraphStorage*>(this)->findHalfEdge(a, b);
+    }
+    std::uint32_t degree(VertexId id) const;
+    /// Appends b to a's list, which must have an inline slot free (parallel).
+    void appendInline(VertexId a, VertexId b, std::uint16_t weight);
+    /// Appends both half-edges; the edge must not exist.
+    void addEdge(VertexId a, VertexId b, std::uint16_t weight);
+    /// Replaces a's list of half-edges (for loading).
+    void setHalfEdges(VertexId a, const std::vector<std::pair<VertexId, std::uint16_t>>& edges);
+    /// False if there was none.
+    bool removeEdge(VertexId a, VertexId b);
+
+    /// Calls f(neighbour, weight code) for each edge of a vertex, in a fixed order.
+    template <class F>
+    void forEachHalfEdge(VertexId id, F&& f) const {
+        const Page& p = page(pageOf(id));
+        const std::uint32_t slot = slotOf(id);
+        const auto& neighbour = p.neighbour[slot];
+        const bool overflow = (p.state[slot] & kOverflow) != 0;
+        const std::uint32_t inlined = Page::kInline - (overflow ? 1 : 0);
+        for (std::uint32_t i = 0; i < inlined; ++i) {
+            if (neighbour[i] == kNoVertex) {
+                return;
+            }
+            f(neighbour[i], p.weight[slot][i]);
+        }
+        if (!overflow) {
+            return;
+        }
+        for (std::uint32_t c = neighbour[Page::kInline - 1]; c != EdgeChunk::kNone;) {
+            const EdgeChunk& chunk = edgeChunks_[c];
+            for (std::uint32_t i = 0; i < EdgeChunk::kSize; ++i) {
+                if (chunk.neighbour[i] == kNoVertex) {
+                    return;
+                }
+                f(chunk.neighbour[i], chunk.weight[i]);
+            }
+            c = chunk.next;
+        }
+    }
+    /// Calls f(id) for each living vertex, ascending.
+    template <class F>
+    void forEachVertex(F&& f) const {
+        for (std::uint32_t p = 0; p < pageCount_; ++p) {
+            forEachBit(page(p).alive, [&](std::uint32_t slot) { f(idOf(p, slot)); });
+        }
+    }
+    /// Calls f(block index) for each block whose bounds meet the box, ascending in index.
+    template <class F>
+    void forEachBlockIn(const Eigen::Vector3f& min, const Eigen::Vector3f& max, F&& f) const;
+
+    std::size_t memoryBytes() const;
+    std::size_t vertexCount() const { return vertexCount_; }
+    std::size_t edgeCount() const { return edgeCount_; }
+    /// Counts of edges made by appendInline, which leaves the counting to its caller.
+    void countEdges(std::size_t added) { edgeCount_ += added; }
+
+    std::vector<EdgeChunk>& edgeChunks() { return edgeChunks_; }
+    const std::vector<EdgeChunk>& edgeChunks() const { return edgeChunks_; }
+
+    /// For loading: makes pages up to this index exist, dead and without a block.
+    void reservePages(std::uint32_t count);
+    /// For loading: after pages were filled in, counts everything again and drops edges that lead
+    /// to dead vertices. Returns the number of edges dropped.
+    std::size_t rebuild();
+
+    static bool overlap(const std::array<float, 3>& aMin, const std::array<float, 3>& aMax,
+                        const Eigen::Vector3f& min, const Eigen::Vector3f& max) {
+        return aMin[0] <= max.x() && aMax[0] >= min.x() && aMin[1] <= max.y() &&
+               aMax[1] >= min.y() && aMin[2] <= max.z() && aMax[2] >= min.z();
+    }
+
+ private:
+    static constexpr std::uint32_t kPagesPerChunk = 16;
+    using PageChunk = std::array<Page, kPagesPerChunk>;
+
+    struct KeyHash {
+        std::size_t operator()(const std::array<std::int32_t, 3>& k) const;
+    };
+
+    void appendHalfEdge(VertexId a, VertexId b, std::uint16_t weight);
+    bool removeHalfEdge(VertexId a, VertexId b);
+    std::uint32_t newEdgeChunk();
+    void freeEdgeChunks(std::uint32_t first);
+    std::uint32_t newPage(std::uint32_t block);
+
+    double blockSize_;
+    std::vector<std::unique_ptr<PageChunk>> chunks_;
+    std::uint32_t pageCount_ = 0;
+    std::vector<std::uint32_t> freePages_;  ///< a heap, smallest on top: as after loading
+    std::vector<Block> blocks_;
+    std::unordered_map<std::array<std::int32_t, 3>, std::uint32_t, KeyHash> blockOfKey_;
+    std::vector<EdgeChunk> edgeChunks_;
+    std::uint32_t freeEdgeChunk_ = EdgeChunk::kNone;
+    std::size_t vertexCount_ = 0, edgeCount_ = 0;
+};
+
+template <class F>
+void GraphStorage::forEachBlockIn(const Eigen::Vector3f& min, const Eigen::Vector3f& max,
+                                  F&& f) const {
+    for (std::uint32_t b = 0; b < blocks_.size(); ++b) {
+        if (blocks_[b].vertices > 0 && overlap(blocks_[b].min, blocks_[b].max, min, max)) {
+            f(b);
+        }
+    }
+}
+
+}  // namespace riftmap

@@ -1,0 +1,354 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "riftmap/graph/graph_storage.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <stdexcept>
+
+namespace riftmap {
+
+void Page::updateBounds() {
+    constexpr float kInf = std::numeric_limits<float>::infinity();
+    min = {kInf, kInf, kInf};
+    max = {-kInf, -kInf, -kInf};
+    forEachBit(alive, [this](std::uint32_t s) {
+        min = {std::min(min[0], x[s]), std::min(min[1], y[s]), std::min(min[2], z[s])};
+        max = {std::max(max[0], x[s]), std::max(max[1], y[s]), std::max(max[2], z[s])};
+    });
+}
+
+GraphStorage::GraphStorage(double blockSize) : blockSize_(blockSize) {}
+
+GraphStorage::GraphStorage(const GraphStorage& other)
+    : blockSize_(other.blockSize_),
+      pageCount_(other.pageCount_),
+      freePages_(other.freePages_),
+      blocks_(other.blocks_),
+      blockOfKey_(other.blockOfKey_),
+      edgeChunks_(other.edgeChunks_),
+      freeEdgeChunk_(other.freeEdgeChunk_),
+      vertexCount_(other.vertexCount_),
+      edgeCount_(other.edgeCount_) {
+    for (const auto& chunk : other.chunks_) {
+        chunks_.push_back(std::make_unique<PageChunk>(*chunk));
+    }
+}
+
+std::size_t GraphStorage::KeyHash::operator()(const std::array<std::int32_t, 3>& k) const {
+    std::uint64_t h = 0;
+    for (const std::int32_t v : k) {
+        h = (h ^ static_cast<std::uint32_t>(v)) * 0x9E3779B97F4A7C15ULL;
+        h ^= h >> 29U;
+    }
+    return h;
+}
+
+std::array<std::int32_t, 3> GraphStorage::keyOf(const Eigen::Vector3f& p) const {
+    const auto cell = [this](float v) {
+        constexpr double kLimit = 2e9;
+        return static_cast<std::int32_t>(
+            std::clamp(std::floor(static_cast<double>(v) / blockSize_), -kLimit, kLimit));
+    };
+    return {cell(p.x()), cell(p.y()), cell(p.z())};
+}
+
+std::uint32_t GraphStorage::findBlock(const std::array<std::int32_t, 3>& key) const {
+    const auto it = blockOfKey_.find(key);
+    return it == blockOfKey_.end() ? kNoBlock : it->second;
+}
+
+std::uint32_t GraphStorage::blockAt(const std::array<std::int32_t, 3>& key) {
+    const auto [it, fresh] = blockOfKey_.try_emplace(key, static_cast<std::uint32_t>(0));
+    if (fresh) {
+        it->second = static_cast<std::uint32_t>(blocks_.size());
+        blocks_.emplace_back();
+        blocks_.back().key = key;
+    }
+    return it->second;
+}
+
+void GraphStorage::reservePages(std::uint32_t count) {
+    while (pageCount_ < count) {
+        if (pageCount_ % kPagesPerChunk == 0) {
+            chunks_.push_back(std::make_unique<PageChunk>());
+        }
+        ++pageCount_;
+    }
+}
+
+std::uint32_t GraphStorage::newPage(std::uint32_t block) {
+    std::uint32_t index = pageCount_;
+    if (freePages_.empty()) {
+        constexpr std::uint32_t kMostPages = kNoVertex / Page::kSize;
+        if (pageCount_ >= kMostPages) {
+            throw std::length_error("pixel graph: more than 2^32 vertices");
+        }
+        reservePages(pageCount_ + 1);
+    } else {
+        std::pop_heap(freePages_.begin(), freePages_.end(), std::greater<>());
+        index = freePages_.back();
+        freePages_.pop_back();
+    }
+    page(index).block = block;
+    blocks_[block].pages.push_back(index);
+    return index;
+}
+
+VertexId GraphStorage::addVertex(std::uint32_t block) {
+    Block& b = blocks_[block];
+    std::uint32_t index = kNoBlock;
+    if (b.vertices < b.pages.size() * Page::kSize) {
+        // The youngest page is the likeliest to have room.
+        for (auto it = b.pages.rbegin(); index == kNoBlock && it != b.pages.rend(); ++it) {
+            if (~page(*it).alive != 0) {
+                index = *it;
+            }
+        }
+    }
+    if (index == kNoBlock) {
+        index = newPage(block);
+    }
+    Page& p = page(index);
+    const auto slot = static_cast<std::uint32_t>(std::countr_one(p.alive));
+    p.alive |= std::uint64_t{1} << slot;
+    p.normal[slot] = 0;
+    p.open[slot] = 0;
+    p.state[slot] = 0;
+    p.neighbour[slot].fill(kNoVertex);
+    ++blocks_[block].vertices;
+    ++vertexCount_;
+    return idOf(index, slot);
+}
+
+void GraphStorage::removeVertex(VertexId id) {
+    std::vector<VertexId> neighbours;
+    forEachHalfEdge(id, [&](VertexId n, std::uint16_t) { neighbours.push_back(n); });
+    for (const VertexId n : neighbours) {
+        removeEdge(id, n);
+    }
+    const std::uint32_t index = pageOf(id);
+    Page& p = page(index);
+    p.alive &= ~(std::uint64_t{1} << slotOf(id));
+    Block& b = blocks_[p.block];
+    --b.vertices;
+    --vertexCount_;
+    if (p.alive == 0) {
+        b.pages.erase(std::find(b.pages.begin(), b.pages.end(), index));
+        p.block = kNoBlock;
+        freePages_.push_back(index);
+        std::push_heap(freePages_.begin(), freePages_.end(), std::greater<>());
+    }
+}
+
+void GraphStorage::updateBounds(std::uint32_t block) {
+    constexpr float kInf = std::numeric_limits<float>::infinity();
+    Block& b = blocks_[block];
+    b.min = {kInf, kInf, kInf};
+    b.max = {-kInf, -kInf, -kInf};
+    for (const std::uint32_t index : b.pages) {
+        const Page& p = page(index);
+        for (std::size_t i = 0; i < 3; ++i) {
+            b.min[i] = std::min(b.min[i], p.min[i]);
+            b.max[i] = std::max(b.max[i], p.max[i]);
+        }
+    }
+}
+
+std::uint16_t* GraphStorage::findHalfEdge(VertexId a, VertexId b) {
+    Page& p = page(pageOf(a));
+    const std::uint32_t slot = slotOf(a);
+    auto& neighbour = p.neighbour[slot];
+    const bool overflow = (p.state[slot] & kOverflow) != 0;
+    const std::uint32_t inlined = Page::kInline - (overflow ? 1 : 0);
+    for (std::uint32_t i = 0; i < inlined; ++i) {
+        if (neighbour[i] == b) {
+            return &p.weight[slot][i];
+        }
+    }
+    if (overflow) {
+        for (std::uint32_t c = neighbour[Page::kInline - 1]; c != EdgeChunk::kNone;
+             c = edgeChunks_[c].next) {
+            EdgeChunk& chunk = edgeChunks_[c];
+            for (std::uint32_t i = 0; i < EdgeChunk::kSize; ++i) {
+                if (chunk.neighbour[i] == b) {
+                    return &chunk.weight[i];
+                }
+            }
+        }
+    }
+    return nullptr;
+}
+
+std::uint32_t GraphStorage::degree(VertexId id) const {
+    std::uint32_t n = 0;
+    forEachHalfEdge(id, [&n](VertexId, std::uint16_t) { ++n; });
+    return n;
+}
+
+void GraphStorage::appendInline(VertexId a, VertexId b, std::uint16_t weight) {
+    Page& p = page(pageOf(a));
+    const std::uint32_t slot = slotOf(a);
+    std::uint32_t i = 0;
+    while (p.neighbour[slot][i] != kNoVertex) {
+        ++i;
+    }
+    p.neighbour[slot][i] = b;
+    p.weight[slot][i] = weight;
+}
+
+std::uint32_t GraphStorage::newEdgeChunk() {
+    std::uint32_t c = freeEdgeChunk_;
+    if (c == EdgeChunk::kNone) {
+        c = static_cast<std::uint32_t>(edgeChunks_.size());
+        edgeChunks_.emplace_back();
+    } else {
+        freeEdgeChunk_ = edgeChunks_[c].next;
+    }
+    edgeChunks_[c].neighbour.fill(kNoVertex);
+    edgeChunks_[c].next = EdgeChunk::kNone;
+    return c;
+}
+
+void GraphStorage::freeEdgeChunks(std::uint32_t first) {
+    while (first != EdgeChunk::kNone) {
+        const std::uint32_t next = edgeChunks_[first].next;
+        edgeChunks_[first].next = freeEdgeChunk_;
+        freeEdgeChunk_ = first;
+        first = next;
+    }
+}
+
+void GraphStorage::appendHalfEdge(VertexId a, VertexId b, std::uint16_t weight) {
+    Page& p = page(pageOf(a));
+    const std::uint32_t slot = slotOf(a);
+    auto& neighbour = p.neighbour[slot];
+    constexpr std::uint32_t kLast = Page::kInline - 1;
+    if ((p.state[slot] & kOverflow) == 0) {
+        if (neighbour[kLast] == kNoVertex) {
+            appendInline(a, b, weight);
+            return;
+        }
+        const std::uint32_t c = newEdgeChunk();
+        edgeChunks_[c].neighbour[0] = neighbour[kLast];
+        edgeChunks_[c].weight[0] = p.weight[slot][kLast];
+        neighbour[kLast] = c;
+        p.state[slot] |= kOverflow;
+    }
+    std::uint32_t c = neighbour[kLast];
+    while (edgeChunks_[c].next != EdgeChunk::kNone) {
+        c = edgeChunks_[c].next;
+    }
+    if (edgeChunks_[c].neighbour[EdgeChunk::kSize - 1] != kNoVertex) {
+        const std::uint32_t fresh = newEdgeChunk();
+        edgeChunks_[c].next = fresh;
+        c = fresh;
+    }
+    std::uint32_t i = 0;
+    while (edgeChunks_[c].neighbour[i] != kNoVertex) {
+        ++i;
+    }
+    edgeChunks_[c].neighbour[i] = b;
+    edgeChunks_[c].weight[i] = weight;
+}
+
+void GraphStorage::addEdge(VertexId a, VertexId b, std::uint16_t weight) {
+    appendHalfEdge(a, b, weight);
+    appendHalfEdge(b, a, weight);
+    ++edgeCount_;
+}
+
+bool GraphStorage::removeHalfEdge(VertexId a, VertexId b) {
+    // Vertices have few edges: take them all out and put the others back.
+    std::vector<std::pair<VertexId, std::uint16_t>> others;
+    bool found = false;
+    forEachHalfEdge(a, [&](VertexId n, std::uint16_t w) {
+        if (n == b) {
+            found = true;
+        } else {
+            others.emplace_back(n, w);
+        }
+    });
+    if (found) {
+        setHalfEdges(a, others);
+    }
+    return found;
+}
+
+void GraphStorage::setHalfEdges(VertexId a,
+                                const std::vector<std::pair<VertexId, std::uint16_t>>& edges) {
+    Page& p = page(pageOf(a));
+    const std::uint32_t slot = slotOf(a);
+    if ((p.state[slot] & kOverflow) != 0) {
+        freeEdgeChunks(p.neighbour[slot][Page::kInline - 1]);
+        p.state[slot] &= static_cast<std::uint8_t>(~kOverflow);
+    }
+    p.neighbour[slot].fill(kNoVertex);
+    for (const auto& [n, w] : edges) {
+        appendHalfEdge(a, n, w);
+    }
+}
+
+bool GraphStorage::removeEdge(VertexId a, VertexId b) {
+    if (!removeHalfEdge(a, b)) {
+        return false;
+    }
+    removeHalfEdge(b, a);
+    --edgeCount_;
+    return true;
+}
+
+std::size_t GraphStorage::memoryBytes() const {
+    std::size_t bytes =
+        chunks_.size() * sizeof(PageChunk) + chunks_.capacity() * sizeof(chunks_[0]) +
+        freePages_.capacity() * sizeof(std::uint32_t) + blocks_.capacity() * sizeof(Block) +
+        edgeChunks_.capacity() * sizeof(EdgeChunk) +
+        // a node and a bucket an entry, as libstdc++ has them
+        blockOfKey_.size() * (sizeof(*blockOfKey_.begin()) + 2 * sizeof(void*)) +
+        blockOfKey_.bucket_count() * sizeof(void*);
+    for (const Block& b : blocks_) {
+        bytes += b.pages.capacity() * sizeof(std::uint32_t);
+    }
+    return bytes;
+}
+
+std::size_t GraphStorage::rebuild() {
+    freePages_.clear();
+    vertexCount_ = 0;
+    for (Block& b : blocks_) {
+        b.vertices = 0;
+    }
+    std::size_t halfEdges = 0;
+    std::vector<std::pair<VertexId, VertexId>> broken;
+    for (std::uint32_t index = 0; index < pageCount_; ++index) {
+        Page& p = page(index);
+        if (p.alive == 0) {
+            freePages_.push_back(index);
+            continue;
+        }
+        p.updateBounds();
+        const auto n = static_cast<std::uint32_t>(std::popcount(p.alive));
+        blocks_[p.block].vertices += n;
+        vertexCount_ += n;
+        forEachBit(p.alive, [&](std::uint32_t slot) {
+            const VertexId id = idOf(index, slot);
+            forEachHalfEdge(id, [&](VertexId b, std::uint16_t) {
+                if (alive(b)) {
+                    ++halfEdges;
+                } else {
+                    broken.emplace_back(id, b);
+                }
+            });
+        });
+    }
+    for (const auto& [a, b] : broken) {
+        removeHalfEdge(a, b);
+    }
+    edgeCount_ = halfEdges / 2;
+    for (std::uint32_t b = 0; b < blocks_.size(); ++b) {
+        updateBounds(b);
+    }
+    return broken.size();
+}
+
+}  // namespace riftmap

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Algorithm 2 and section VII of the paper: a view becomes part of the map.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "association.h"
+#include "rift_finder.h"
+#include "riftmap/graph/graph_storage.h"
+#include "riftmap/graph/pixel_graph.h"
+#include "view_points.h"
+
+namespace riftmap {
+
+/// Surface of the map in whole units, so that the order of adding does not matter.
+std::int64_t areaUnits(std::uint16_t areaCode);
+inline constexpr double kAreaUnitsPerSquareMetre = 1e12;
+
+/// Merges views; keeps its buffers from one to the next.
+class Merger {
+ public:
+    explicit Merger(const GraphOptions& options) : options_(options) {}
+
+    /// The view must have been checked. `area` is kept up to date [area units].
+    MergeResult merge(const View& view, GraphStorage& storage, RiftFinder& rifts,
+                      std::int64_t& area);
+    const MergeTimes& times() const { return times_; }
+    std::size_t memoryBytes() const;
+
+ private:
+    /// What a page's vertices ask for while they are fused in parallel.
+    struct PageWork {
+        std::int64_t area = 0;                           ///< change [area units]
+        std::uint64_t moved = 0;                         ///< slots whose position changed
+        std::uint64_t doomed = 0;                        ///< slots to delete
+        bool touched = false;                            ///< rifts must be looked at again
+        std::vector<std::pair<VertexId, VertexId>> cut;  ///< high edges seen through
+    };
+    struct NewEdge {
+        VertexId a, b;
+        std::uint16_t code;
+    };
+
+    void findSeenThroughEdges(const GraphStorage& storage, std::uint32_t which);
+    void fusePage(const View& view, GraphStorage& storage, std::uint32_t which);
+    void fuse(const View& view, Page& page, std::uint32_t slot, std::uint32_t candidate,
+              PageWork& work);
+    void passOver(Page& page, std::uint32_t slot, std::uint32_t candidate, PageWork& work);
+    bool lookedThrough(const Candidate& candidate) const;
+    void deleteSeenThrough(GraphStorage& storage, RiftFinder& rifts, MergeResult& result);
+    void grow(const View& view, GraphStorage& storage, MergeResult& result);
+    void connectNew(GraphStorage& storage, MergeResult& result);
+    void connectMatched(GraphStorage& storage, MergeResult& result);
+    bool wanted(const GraphStorage& storage, VertexId a, VertexId b, std::uint16_t code) const;
+    void refreshNormals(GraphStorage& storage);
+    void finish(GraphStorage& storage, RiftFinder& rifts, std::int64_t& area);
+    std::uint8_t openBits(std::uint8_t kinds, std::uint8_t state, float sigma) const;
+    bool paper() const { return options_.fusion == GraphOptions::Fusion::kFirst; }
+
+    GraphOptions options_;
+    MergeTimes times_;
+    ViewPoints points_;
+    Association seen_;
+    std::vector<PageWork> work_;         ///< beside seen_.pages
+    std::vector<VertexId> vertexOf_;     ///< pixel -> vertex that it shows
+    std::vector<std::uint32_t> fresh_;   ///< pixels that became vertices
+    std::vector<std::uint8_t> isFresh_;  ///< pixel -> became a vertex
+    std::vector<std::uint32_t> touchedBlocks_;
+    std::vector<std::uint32_t> freshPages_;
+    std::vector<std::vector<NewEdge>> wantedEdges_;
+};
+
+}  // namespace riftmap

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A view as the graph G_{i+1} of the paper: its points, edges and open pixels, before any merge.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "riftmap/core/view.h"
+#include "riftmap/graph/pixel_graph.h"
+
+namespace riftmap {
+
+/// A plane through a patch of the disparity image (planes are linear in disparity):
+/// disparity = slopeColumn * dc + slopeRow * dr + value, (dc, dr) from the centre pixel.
+struct PatchPlane {
+    int column = 0, row = 0;  ///< centre pixel
+    float slopeColumn = 0, slopeRow = 0, value = 0;
+    float tolerance = -1;  ///< [px] a pixel farther off lies on another surface; < 0: no plane
+    Eigen::Vector3f normal = Eigen::Vector3f::Zero();  ///< camera frame, towards the camera
+    float inverseDistance = 0;                         ///< of the plane from the camera [1/m]
+
+    float disparity(int c, int r) const {
+        return value + slopeColumn * static_cast<float>(c - column) +
+               slopeRow * static_cast<float>(r - row);
+    }
+};
+
+/// Buffers are kept from view to view. Not thread-safe; build() runs its loops in parallel.
+class ViewPoints {
+ public:
+    static constexpr std::uint16_t kNoEdge = 0xFFFF;
+    static constexpr int kPatch = 4;  ///< side of the patches that share a plane [px]
+
+    /// Eqs. (1)-(3) for a checked view; sorts pixels by what their neighbours are.
+    void build(const View& view, const GraphOptions& options);
+
+    int width = 0, height = 0;
+    std::size_t validCount = 0;
+    float fx = 1, fy = 1, cx = 0, cy = 0, fb = 1;
+    float footprint = 1;          ///< side of a pixel at a depth of 1 m [m]
+    Eigen::Matrix3f rotation;     ///< world_R_camera
+    Eigen::Vector3f translation;  ///< of the camera in the map frame
+
+    std::vector<float> z;                    ///< depth [m]; 0 = no vertex
+    std::vector<float> sigma;                ///< standard deviation of z [m]
+    std::vector<float> stretch;              ///< 1 / cos of the viewing angle, in [1, 10]
+    std::vector<std::uint16_t> right, down;  ///< weight code of the edge there, or kNoEdge
+    std::vector<std::uint8_t> kinds;         ///< OpenKind bits but kTooCoarse
+    std::vector<PatchPlane> patches;         ///< a plane a patch, row-major
+
+    std::size_t index(int column, int row) const {
+        return static_cast<std::size_t>(row) * static_cast<std::size_t>(width) +
+               static_cast<std::size_t>(column);
+    }
+    const PatchPlane& patch(int column, int row) const {
+        return patches[static_cast<std::size_t>(row / kPatch) *
+                           static_cast<std::size_t>(patchColumns_) +
+                       static_cast<std::size_t>(column / kPatch)];
+    }
+    /// Eq. (1) in the camera frame.
+    Eigen::Vector3f inCamera(int column, int row, float depth) const {
+        return {(static_cast<float>(column) - cx) * depth / fx,
+                (static_cast<float>(row) - cy) * depth / fy, depth};
+    }
+    Eigen::Vector3f inMap(int column, int row) const {
+        return rotation * inCamera(column, row, z[index(column, row)]) + translation;
+    }
+    /// True if the pixel lies on the plane of its patch.
+    bool onPatch(int column, int row) const;
+    /// Surface that a pixel stands for [m^2].
+    float area(int column, int row) const;
+
+ private:
+    void computeDepth(const View& view, int row);
+    void fitPatch(const DisparityImage& disparity, int patchColumn, int patchRow);
+    void computeEdges(const GraphOptions& options, int row);
+    void computeKinds(const GraphOptions& options, int firstColumn, int row);
+    std::uint16_t edge(const GraphOptions& options, int c, int r, int c2, int r2) const;
+    bool explained(int c, int r, int c2, int r2, float tolerance) const;
+
+    int patchColumns_ = 0;
+};
+
+}  // namespace riftmap
