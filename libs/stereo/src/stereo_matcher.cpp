@@ -2,6 +2,7 @@
 #include "riftmap/stereo/stereo_matcher.h"
 
 #include "riftmap/stereo/opencv_matchers.h"
+#include "riftmap/stereo/paper_matcher.h"
 
 namespace riftmap {
 
@@ -17,6 +18,21 @@ void StereoOptions::describe(OptionTable& table) {
     table.add("num_disparities", numDisparities, 1, 1024, "",
               "How many disparities are searched, 1 px apart.");
     table.add("window", window, 3, 21, "px", "Side of the square correlation window; odd.");
+    table.addChoice<Prefilter>(
+        "prefilter", prefilter,
+        {{"none", Prefilter::kNone}, {"dog", Prefilter::kDog}, {"gradient", Prefilter::kGradient}},
+        "What is matched: the image, its difference of Gaussians (the paper), or its derivative "
+        "along the row.");
+    table.add("prefilter_gain", prefilterGain, 1, 16, "", "Factor on the filtered image.");
+    table.add("prefilter_cap", prefilterCap, 1, 127, "grey levels",
+              "Filtered values are clipped to plus and minus this.");
+    table.add("truncation", truncation, 1, 127, "grey levels",
+              "Largest difference that one pixel counts with.");
+    table.add("supporting_windows", supportingWindows,
+              "Match with five small windows that share out the window, the centre and the better "
+              "two of the corners, instead of one.");
+    table.add("sharpness", sharpness, 0.0, 255.0, "grey levels",
+              "Least second difference of the cost at its minimum, a pixel of the window.");
     table.add("left_right_check", leftRightCheck,
               "Discard matches that the right image does not agree with.");
     table.add("left_right_tolerance", leftRightTolerance, 0, 16, "px",
@@ -43,6 +59,7 @@ std::unique_ptr<StereoMatcher> makeStereoMatcher(const StereoOptions& options) {
     }
     switch (options.matcher) {
         case MatcherKind::kPaper:
+            return std::make_unique<PaperMatcher>(options);
         case MatcherKind::kOpenCvBlock:
             return std::make_unique<OpenCvBlockMatcher>(options);
         case MatcherKind::kOpenCvSgbm:

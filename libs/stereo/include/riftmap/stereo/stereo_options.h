@@ -13,15 +13,28 @@ enum class MatcherKind {
     kGiven,        ///< none: the observation brings its disparity
 };
 
+/// What PaperMatcher does to the images first.
+enum class Prefilter {
+    kNone,
+    kDog,       ///< difference of Gaussians (the paper)
+    kGradient,  ///< derivative along the row (Sobel)
+};
+
 /// Section [Stereo]: from a rectified pair to disparity.
 struct StereoOptions {
     MatcherKind matcher = MatcherKind::kPaper;
     int minDisparity = 0;     ///< least disparity searched [px]; may be negative
     int numDisparities = 64;  ///< how many disparities are searched, 1 px apart; > 0
     int window = 11;          ///< side of the correlation window [px], odd, 3..21
+    Prefilter prefilter = Prefilter::kGradient;
+    int prefilterGain = 1;          ///< factor on the filtered image
+    int prefilterCap = 31;          ///< filtered values are clipped to +- this [grey levels]
+    int truncation = 62;            ///< largest difference of one pixel [grey levels]
+    bool supportingWindows = true;  ///< several small windows instead of one
+    double sharpness = 0.0;         ///< least curvature of a minimum [grey levels a pixel]
     bool leftRightCheck = true;
     int leftRightTolerance = 1;  ///< largest difference of the two directions [px]
-    int uniqueness = 10;         ///< the second best minimum is at least so much worse [%]
+    int uniqueness = 5;          ///< the second best minimum is at least so much worse [%]
     bool subpixel = true;
     int isolatedSize = 100;           ///< groups of fewer pixels are discarded; 0 keeps all [px]
     double isolatedDifference = 1.0;  ///< neighbours nearer than this belong together [px]
