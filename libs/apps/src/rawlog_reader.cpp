@@ -14,6 +14,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <utility>
 
+#include "riftmap/apps/stored_disparity.h"
 #include "riftmap/core/mrpt_time.h"
 #include "riftmap/core/text.h"
 #include "riftmap/core/tum.h"
@@ -432,6 +433,9 @@ class RawlogReader::Impl {
 
     /// Sets images and camera. Returns the pose of the rectified camera in the raw one.
     Pose rectify(const CObservationStereoImages& pair, StereoObservation& observation) {
+        if (takeMeasured(pair, observation)) {
+            return {};
+        }
         if (!pair.hasImageRight) {
             throw Nonsense(labelled(pair) + " has no right image");
         }
@@ -450,6 +454,34 @@ class RawlogReader::Impl {
         observation.camera = rectified.camera;
         validate(observation.camera);
         return rectified.raw_T_rectified;
+    }
+
+    /// A pair whose disparity was measured when it was recorded needs no right image.
+    bool takeMeasured(const CObservationStereoImages& pair, StereoObservation& observation) {
+        try {
+            observation.disparity = loadDisparity(pair);
+        } catch (const std::runtime_error& error) {
+            throw Nonsense(error.what());
+        }
+        if (!observation.disparity) {
+            return false;
+        }
+        if (!pair.areImagesRectified()) {
+            throw Nonsense(labelled(pair) + " has disparity of images that are not rectified");
+        }
+        observation.left = pixels(pair.imageLeft, images_);
+        checkSize(observation.left, pair.leftCamera, "left");
+        const mrpt::img::TCamera& left = pair.leftCamera;
+        observation.camera = {static_cast<int>(left.ncols),
+                              static_cast<int>(left.nrows),
+                              left.fx(),
+                              left.fy(),
+                              left.cx(),
+                              left.cy(),
+                              pair.rightCameraPose.x(),
+                              pair.rightCamera.cx() - left.cx()};
+        validate(observation.camera);
+        return true;
     }
 
     std::filesystem::path file_;

@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "riftmap/apps/rawlog_objects.h"
+#include "riftmap/apps/stored_disparity.h"
 #include "riftmap/core/mrpt_time.h"
 #include "riftmap/core/text.h"
 
@@ -57,8 +58,13 @@ mrpt::obs::CObservationStereoImages::Ptr toMrpt(const StereoObservation& observa
     pair->sensorLabel = label;
     pair->timestamp = toMrptTime(observation.time_ns);
     pair->imageLeft = copyOf(observation.left);
-    pair->imageRight = copyOf(observation.right);
-    pair->hasImageRight = true;
+    pair->hasImageRight = !observation.right.empty();
+    if (pair->hasImageRight) {
+        pair->imageRight = copyOf(observation.right);
+    }
+    if (observation.disparity) {
+        storeDisparity(*observation.disparity, *pair);
+    }
     for (auto* side : {&pair->leftCamera, &pair->rightCamera}) {
         side->ncols = static_cast<std::uint32_t>(camera.width);
         side->nrows = static_cast<std::uint32_t>(camera.height);
@@ -102,7 +108,9 @@ class RawlogWriter::Impl {
     void put(mrpt::obs::CObservationStereoImages& pair) {
         if (images_ == Images::kExternal) {
             moveOut(pair.imageLeft, pair, "left");
-            moveOut(pair.imageRight, pair, "right");
+            if (pair.hasImageRight) {
+                moveOut(pair.imageRight, pair, "right");
+            }
         }
         put(static_cast<const mrpt::serialization::CSerializable&>(pair));
     }

@@ -83,13 +83,15 @@ World makeSculpture() {
              {0.0, 0.06}},
             48);
     b.material(matter("post", 0.52F, 0.46F, 0.38F));
-    b.cylinder({0.14, 0, 0.26}, 0.035, 0.24, 32, 0);
+    for (const double side : {-1.0, 1.0}) {  // up to two of the knot's three lowest points
+        b.cylinder({0.225, side * 0.147, 0.26}, 0.025, 0.285, 32, 0);
+    }
     b.material(matter("knot", 0.68F, 0.46F, 0.30F));
     b.frame({0.14, 0, 0.62});
     b.tube(knot, 0.035, 240, 24, true);
     b.frame({0, 0, 0});
     b.material(matter("ring", 0.46F, 0.42F, 0.58F));
-    b.torus({0.14, 0, 0.62}, Point(0.3, 1, 0.1), 0.33, 0.018, 120, 18);
+    b.torus({0.14, 0, 0.62}, Point(0.3, 1, 0.1), 0.35, 0.018, 120, 18);
     b.material(matter("rods", 0.60F, 0.62F, 0.45F));
     for (int i = 0; i < 4; ++i) {
         const double y = -0.15 + 0.1 * i;
