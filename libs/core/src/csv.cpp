@@ -85,6 +85,7 @@ void CsvWriter::row(const std::vector<Field>& fields) {
                                     " fields under a header of " + std::to_string(columns_));
     }
     std::vector<std::string> cells;
+    cells.reserve(fields.size());
     for (const auto& field : fields) {
         cells.push_back(field.text());
     }

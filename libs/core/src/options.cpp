@@ -189,8 +189,9 @@ void OptionTable::addDegrees(const std::string& key, double& radians, double min
 }
 
 void OptionTable::addNamed(const std::string& key, const std::vector<std::string>& names,
-                           const std::string& optionText, std::function<void(std::size_t)> setIndex,
-                           std::function<std::size_t()> index) {
+                           const std::string& optionText,
+                           const std::function<void(std::size_t)>& setIndex,
+                           const std::function<std::size_t()>& index) {
     std::string allowed;
     for (const auto& name : names) {
         allowed += (allowed.empty() ? "" : " | ") + name;

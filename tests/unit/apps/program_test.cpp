@@ -239,7 +239,7 @@ TEST(Program, RunDirectoryRecordsTheRun) {
     const auto input = writeIni("input.txt", "abc");
     const Arguments arguments = {input,    "--out", dir.string(), "--set", "Sample.length=3",
                                  "--seed", "9"};
-    const auto run = [&](Arguments with) {
+    const auto run = [&](const Arguments& with) {
         SampleProgram program;
         program.failure = [&] { program.makeRunDirectory({input}); };
         return outcome(program, with);

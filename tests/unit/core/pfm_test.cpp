@@ -47,7 +47,7 @@ TEST(Pfm, BrokenFilesAreNamedWithThePlace) {
     const TemporaryFolder folder;
     const auto message = [&](const std::string& bytes) {
         const auto file = folder.write("x.pfm", bytes);
-        const std::string m = messageOf<FileError>([&] { readPfm(file); });
+        std::string m = messageOf<FileError>([&] { readPfm(file); });
         EXPECT_THAT(m, HasSubstr("x.pfm: byte "));
         return m;
     };

@@ -97,7 +97,7 @@ TEST(Ply, BrokenFilesAreNamedWithThePlace) {
     const TemporaryFolder folder;
     const auto message = [&](const std::string& bytes) {
         const auto file = folder.write("x.ply", bytes);
-        const std::string m = messageOf<FileError>([&] { readPly(file); });
+        std::string m = messageOf<FileError>([&] { readPly(file); });
         EXPECT_THAT(m, HasSubstr("x.ply:"));
         EXPECT_THAT(m, ::testing::Not(HasSubstr("\n")));
         return m;

@@ -84,7 +84,7 @@ TEST(Tum, BrokenFilesAreNamedWithTheLine) {
     const TemporaryFolder folder;
     const auto message = [&](const std::string& second) {
         const auto file = folder.write("x.tum", "1 0 0 0 0 0 0 1\n" + second + "\n");
-        const std::string m = messageOf<FileError>([&] { readTum(file); });
+        std::string m = messageOf<FileError>([&] { readTum(file); });
         EXPECT_THAT(m, HasSubstr("x.tum:2: "));
         return m;
     };

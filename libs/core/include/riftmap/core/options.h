@@ -54,6 +54,7 @@ class OptionTable {
     void addChoice(const std::string& key, E& value,
                    const std::vector<std::pair<std::string, E>>& choices, const std::string& text) {
         std::vector<std::string> names;
+        names.reserve(choices.size());
         for (const auto& c : choices) {
             names.push_back(c.first);
         }
@@ -85,8 +86,8 @@ class OptionTable {
 
  private:
     void addNamed(const std::string& key, const std::vector<std::string>& names,
-                  const std::string& text, std::function<void(std::size_t)> setIndex,
-                  std::function<std::size_t()> index);
+                  const std::string& text, const std::function<void(std::size_t)>& setIndex,
+                  const std::function<std::size_t()>& index);
     void addOption(Option option);
     void assign(const std::string& section, const std::string& key, const std::string& value,
                 const std::string& where);
