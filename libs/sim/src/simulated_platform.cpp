@@ -174,6 +174,29 @@ DisparityImage exactDisparity(const Truth& truth, const CameraOptions& options,
     return image;
 }
 
+std::uint64_t viewSeed(std::uint64_t seed, std::uint64_t view) {
+    return mixBits(seed, view);
+}
+
+StereoObservation observe(const StereoRenderer& renderer, const CameraOptions& camera,
+                          const NoiseOptions& noise, const Pose& world_T_camera,
+                          std::uint64_t noiseSeed) {
+    StereoObservation observation;
+    observation.camera = renderer.camera();
+    observation.world_T_camera = world_T_camera;
+    if (noise.level == NoiseOptions::Level::kN4) {
+        StereoRenderer::Pair pair = renderer.renderPair(world_T_camera, noiseSeed);
+        observation.left = pair.left;
+        observation.right = pair.right;
+    } else {
+        const bool noisy = noise.level == NoiseOptions::Level::kN3;
+        observation.left = renderer.renderQuick(world_T_camera);
+        observation.disparity =
+            exactDisparity(renderer.truth(world_T_camera, false, noisy), camera, noise, noiseSeed);
+    }
+    return observation;
+}
+
 // ---- Platform ----------------------------------------------------------------------------------
 
 struct SimulatedPlatform::Parts {
@@ -386,22 +409,12 @@ void SimulatedPlatform::setState(const State& state) {
 
 StereoObservation SimulatedPlatform::grab() {
     State& state = parts_->state;
-    const std::uint64_t noiseSeed = mixBits(parts_->seed, state.views);
-    StereoObservation observation;
+    StereoObservation observation =
+        observe(parts_->renderer, parts_->options.camera, parts_->options.noise, state.pose,
+                viewSeed(parts_->seed, state.views));
     observation.time_ns = state.time_ns;
-    observation.camera = camera();
-    observation.world_T_camera = state.pose;
-    const NoiseOptions& noise = parts_->options.noise;
-    if (noise.level == NoiseOptions::Level::kN4) {
-        const auto pair = parts_->renderer.renderPair(state.pose, noiseSeed);
-        observation.left = parts_->rectified(pair.left);
-        observation.right = parts_->rectified(pair.right);
-    } else {
-        const bool noisy = noise.level == NoiseOptions::Level::kN3;
-        observation.left = parts_->renderer.renderQuick(state.pose);
-        observation.disparity = exactDisparity(parts_->renderer.truth(state.pose, false, noisy),
-                                               parts_->options.camera, noise, noiseSeed);
-    }
+    observation.left = parts_->rectified(observation.left);
+    observation.right = parts_->rectified(observation.right);
     ++state.views;
     state.time_ns += std::llround(parts_->options.platform.viewSeconds * 1e9);
     return observation;

@@ -65,6 +65,15 @@ struct SimulationOptions {
 DisparityImage exactDisparity(const Truth& truth, const CameraOptions& camera,
                               const NoiseOptions& noise, std::uint64_t noiseSeed);
 
+/// Seed of the noise in view number `view`.
+std::uint64_t viewSeed(std::uint64_t seed, std::uint64_t view);
+
+/// What the rig sees from a pose. N0, N3: `left` is a quick picture, `right` is empty, `disparity`
+/// is set. N4: a pair, still distorted if the lens is. The time is 0.
+StereoObservation observe(const StereoRenderer& renderer, const CameraOptions& camera,
+                          const NoiseOptions& noise, const Pose& world_T_camera,
+                          std::uint64_t noiseSeed);
+
 /// A stereo camera that moves in a world. Owns world, caster and renderer. Not thread-safe.
 class SimulatedPlatform : public CameraPlatform {
  public:
@@ -82,8 +91,8 @@ class SimulatedPlatform : public CameraPlatform {
     /// one. Throws CollisionError (counted) as the base class says; std::invalid_argument, before
     /// anything moves, for a path longer than the largest step or a pose this kind cannot take.
     void moveAlong(const std::vector<Pose>& path) override;
-    /// N0, N3: `left` is a quick picture, `right` is empty, `disparity` is set. N4: a rectified
-    /// pair. The sensor noise depends on the seed and the number of views before.
+    /// As observe() tells; N4's pairs are rectified. The noise depends on the seed and the number
+    /// of views before.
     StereoObservation grab() override;
 
     /// What decides the next observation: to go on from an earlier run.
