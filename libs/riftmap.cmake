@@ -45,11 +45,17 @@ function(riftmap_add_library name)
 endfunction()
 
 # riftmap_add_program(NAME) in apps/NAME: main.cpp over the class in libs/apps.
+# The target is NAME-program where a library has taken the target NAME (riftmap-eval).
 function(riftmap_add_program name)
-  add_executable(${name} main.cpp)
-  riftmap_set_compile_options(${name})
-  target_link_libraries(${name} PRIVATE riftmap::apps)
-  install(TARGETS ${name})
+  set(target ${name})
+  if(TARGET ${name})
+    set(target ${name}-program)
+  endif()
+  add_executable(${target} main.cpp)
+  set_target_properties(${target} PROPERTIES OUTPUT_NAME ${name})
+  riftmap_set_compile_options(${target})
+  target_link_libraries(${target} PRIVATE riftmap::apps)
+  install(TARGETS ${target})
 endfunction()
 
 # riftmap_add_tests(NAME LINK lib ... [LABELS l ...]): every *.cpp of the folder becomes one GoogleTest program.

@@ -18,7 +18,7 @@ namespace riftmap {
 
 namespace {
 
-constexpr std::uint32_t kMethodVersion = 1;
+constexpr std::uint32_t kMethodVersion = 2;
 
 /// Most samples are seen along one of a few lines of sight. Deep inside what is hidden a moderate
 /// fan will do, for each sample's fan is turned differently; the finest one is for the rim of what
@@ -30,7 +30,7 @@ struct Round {
 
 std::array<Round, 3> roundsOf(int directions) {
     return {{{std::min(64, directions), false},
-             {std::max(directions / 4, 16), false},
+             {std::max(directions / 8, 16), false},
              {directions, true}}};
 }
 
@@ -247,8 +247,9 @@ class Spreading {
     PointIndex index_;
 };
 
+/// Without the start: all starts in one connected space have the same set.
 std::uint64_t keyOf(const SurfaceSamples& samples, const ViewSpace& space,
-                    const EvalOptions& options) {
+                    const ReachableSpace& reachable, const EvalOptions& options) {
     Fnv hash;
     hash.add(kMethodVersion);
     hash.add(samples.meshHash);
@@ -257,13 +258,17 @@ std::uint64_t keyOf(const SurfaceSamples& samples, const ViewSpace& space,
     for (int k = 0; k < 3; ++k) {
         hash.add(space.boxMin[k]);
         hash.add(space.boxMax[k]);
-        hash.add(space.start[k]);
     }
     for (const double x : {space.clearance, space.nearLimit, space.farLimit, space.minElevation,
                            space.maxElevation, options.maxIncidence, options.grid}) {
         hash.add(x);
     }
     hash.add(options.directions);
+    reachable.forEach([&](const Eigen::Vector3d& p) {
+        hash.add(p.x());
+        hash.add(p.y());
+        hash.add(p.z());
+    });
     return hash.value();
 }
 
@@ -290,13 +295,14 @@ ViewSpace viewSpaceOf(const PlatformLimits& limits, const StereoCamera& camera,
 ObservableSet observableSet(const RayCaster& caster, const ViewSpace& space,
                             const SurfaceSamples& samples, const EvalOptions& options) {
     ObservableSet out;
-    out.key = keyOf(samples, space, options);
+    const ReachableSpace reachable(caster, space, options.grid);
+    out.key = keyOf(samples, space, reachable, options);
+    out.grid = reachable.grid();
     const std::size_t count = samples.points.size();
     std::vector<std::int8_t> sides;
-    if (!options.cache.empty() && readObservable(options.cache, out.key, count, sides, out.grid)) {
+    if (!options.cache.empty() && readObservable(options.cache, out.key, count, sides)) {
         out.fromCache = true;
     } else {
-        const ReachableSpace reachable(caster, space, options.grid);
         const SightFinder finder(caster, space, reachable, samples, options.maxIncidence);
         std::vector<Sight> sights(count);
         const Spreading spreading(finder, samples);
@@ -314,9 +320,8 @@ ObservableSet observableSet(const RayCaster& caster, const ViewSpace& space,
         sides.resize(count);
         std::transform(sights.begin(), sights.end(), sides.begin(),
                        [](const Sight& s) { return s.side; });
-        out.grid = reachable.grid();
         if (!options.cache.empty()) {
-            writeObservable(options.cache, out.key, sides, out.grid);
+            writeObservable(options.cache, out.key, sides);
         }
     }
     out.observable.resize(count);

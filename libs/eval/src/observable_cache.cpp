@@ -14,10 +14,9 @@ namespace riftmap {
 namespace {
 
 struct Header {
-    char magic[8] = {'R', 'M', 'O', 'B', 'S', '0', '1', '\n'};
+    char magic[8] = {'R', 'M', 'O', 'B', 'S', '0', '2', '\n'};
     std::uint64_t key = 0;
     std::uint64_t count = 0;
-    double grid = 0;
     std::uint64_t checksum = 0;  ///< of the sides
 };
 
@@ -37,7 +36,7 @@ std::uint64_t checksum(const std::vector<std::int8_t>& sides) {
 }  // namespace
 
 bool readObservable(const std::filesystem::path& directory, std::uint64_t key, std::size_t count,
-                    std::vector<std::int8_t>& sides, double& grid) {
+                    std::vector<std::int8_t>& sides) {
     std::ifstream in(fileOf(directory, key), std::ios::binary);
     Header header;
     const Header expected;
@@ -52,17 +51,15 @@ bool readObservable(const std::filesystem::path& directory, std::uint64_t key, s
         return false;
     }
     sides.swap(read);
-    grid = header.grid;
     return true;
 }
 
 void writeObservable(const std::filesystem::path& directory, std::uint64_t key,
-                     const std::vector<std::int8_t>& sides, double grid) {
+                     const std::vector<std::int8_t>& sides) {
     std::filesystem::create_directories(directory);
     Header header;
     header.key = key;
     header.count = sides.size();
-    header.grid = grid;
     header.checksum = checksum(sides);
     writeAtomically(fileOf(directory, key), [&](std::ostream& out) {
         out.write(reinterpret_cast<const char*>(&header), sizeof header);

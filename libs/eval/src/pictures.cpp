@@ -41,6 +41,8 @@ cv::Vec3d heat(double deltas) {
 }
 
 void legend(cv::Mat& picture, const std::vector<std::pair<cv::Vec3d, std::string>>& entries) {
+    cv::rectangle(picture, cv::Rect(6, 8, 420, 22 * static_cast<int>(entries.size()) + 6),
+                  cv::Scalar(255, 255, 255), cv::FILLED);
     int y = 14;
     for (const auto& [colour, text] : entries) {
         cv::rectangle(picture, cv::Rect(12, y, 22, 14), cv::Scalar(colour[0], colour[1], colour[2]),
@@ -206,8 +208,12 @@ cv::Mat CoveragePictures::errors(std::size_t viewpoint, std::span<const float> v
             continue;
         }
         const Eigen::Vector3d p = vertices_[i].cast<double>();
-        if (!normals_.empty() && normals_[i].cast<double>().dot(p - eye.pose.translation) > 0) {
-            continue;  // turned away, like the surfaces left out
+        double facing = 1;
+        if (!normals_.empty() && normals_[i].squaredNorm() > 0.5F) {
+            facing = normals_[i].cast<double>().dot((eye.pose.translation - p).normalized());
+            if (facing < 0) {
+                continue;  // turned away, like the surfaces left out
+            }
         }
         const Eigen::Vector3d q = camera_T_world * p;
         if (q.z() <= 0) {
@@ -222,7 +228,7 @@ cv::Mat CoveragePictures::errors(std::size_t viewpoint, std::span<const float> v
             for (int c = std::max(0, column - half); c <= std::min(width - 1, column + half); ++c) {
                 if (z < depth.at<float>(r, c)) {
                     depth.at<float>(r, c) = z;
-                    picture.at<cv::Vec3b>(r, c) = shaded(colour, 1);
+                    picture.at<cv::Vec3b>(r, c) = shaded(colour, facing);
                 }
             }
         }

@@ -45,18 +45,16 @@ ReachableSpace::ReachableSpace(const RayCaster& caster, const ViewSpace& space, 
     if (grid_ <= 0) {
         grid_ = std::clamp(space.clearance / 2, 0.02, 0.1);
     }
-    // Node 0 is the last one at or beyond boxMin that is a whole number of steps from the start.
-    const auto stepsBelow = [&] {
-        return Eigen::Vector3d(((space_.start - space_.boxMin) / grid_).array().floor());
+    const auto steps = [&] {
+        const Eigen::Vector3d sides = space_.boxMax - space_.boxMin;
+        return Eigen::Vector3d((sides.array() / grid_ + 1e-9).floor());
     };
-    const auto stepsAbove = [&] {
-        return Eigen::Vector3d(((space_.boxMax - space_.start) / grid_).array().floor());
-    };
-    while (((stepsBelow() + stepsAbove()).array() + 1).prod() > kMostNodes) {
+    while ((steps().array() + 1).prod() > kMostNodes) {
         grid_ *= 1.1;
     }
-    origin_ = space_.start - grid_ * stepsBelow();
-    size_ = (stepsBelow() + stepsAbove()).cast<int>() + Eigen::Vector3i::Ones();
+    size_ = steps().cast<int>() + Eigen::Vector3i::Ones();
+    // What is left over lies at both ends alike.
+    origin_ = (space_.boxMin + space_.boxMax - grid_ * steps()) / 2;
     const auto count = static_cast<std::size_t>(size_.x()) * static_cast<std::size_t>(size_.y()) *
                        static_cast<std::size_t>(size_.z());
     distance_.resize(count);
@@ -66,7 +64,13 @@ ReachableSpace::ReachableSpace(const RayCaster& caster, const ViewSpace& space, 
         distance_[i] = static_cast<float>(wall ? wall->distance : cap);
     });
     reachable_.assign(count, 0);
-    flood(static_cast<std::size_t>(nearestNode(space_.start)));
+    const std::vector<std::size_t> first = nodesAround(space_.start);
+    if (first.empty()) {
+        throw std::runtime_error("from the start " + text(space_.start) +
+                                 " no camera position of the grid of " + std::to_string(grid_) +
+                                 " m can be reached; a smaller Eval.grid may help");
+    }
+    flood(first);
 }
 
 Eigen::Vector3d ReachableSpace::position(std::size_t node) const {
@@ -98,9 +102,23 @@ bool ReachableSpace::stepClear(std::size_t a, std::size_t b) const {
     return caster_->sweptClear(position(a), position(b), space_.clearance);
 }
 
-void ReachableSpace::flood(std::size_t start) {
-    std::vector<std::size_t> queue{start};
-    reachable_[start] = 1;
+std::vector<std::size_t> ReachableSpace::nodesAround(const Eigen::Vector3d& place) const {
+    std::vector<std::size_t> out;
+    for (int i = 0; i < 27; ++i) {
+        const Eigen::Vector3d offset(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
+        const std::ptrdiff_t node = nearestNode(place + grid_ * offset);
+        if (node >= 0 && caster_->sweptClear(place, position(static_cast<std::size_t>(node)),
+                                             space_.clearance)) {
+            out.push_back(static_cast<std::size_t>(node));
+        }
+    }
+    return out;
+}
+
+void ReachableSpace::flood(std::vector<std::size_t> queue) {
+    for (const std::size_t node : queue) {
+        reachable_[node] = 1;
+    }
     const std::ptrdiff_t stride[3] = {1, size_.x(),
                                       static_cast<std::ptrdiff_t>(size_.x()) * size_.y()};
     for (std::size_t head = 0; head < queue.size(); ++head) {

@@ -22,7 +22,7 @@ class RoomSpace : public ::testing::Test {
         space_.clearance = 0.2;
         space_.nearLimit = 0.4;
         space_.farLimit = 6;
-        options_.samples = 20000;
+        options_.samples = 6000;
     }
     ObservableSet observe() const {
         const RayCaster caster(mesh_);
@@ -51,7 +51,7 @@ TEST_F(RoomSpace, TheSideSeenDecidesTheNormal) {
     }
     const ObservableSet set = observe();
     const SurfaceSamples samples = groundTruthSamples(mesh_, options_);
-    EXPECT_GT(set.count, 19000U);
+    EXPECT_GT(set.count, 5700U);
     for (std::size_t i = 0; i < samples.points.size(); ++i) {
         if (set.observable[i] != 0) {
             ASSERT_LT(set.normals[i].dot(samples.normals[i]), 0);
@@ -68,7 +68,7 @@ TEST_F(RoomSpace, AWallWithoutADoorHidesWhatIsBehind) {
             ASSERT_EQ(set.observable[i], 0) << samples.points[i].transpose();
         }
     }
-    EXPECT_GT(set.count, 5000U);
+    EXPECT_GT(set.count, 1500U);
 }
 
 TEST_F(RoomSpace, ADoorWiderThanTwiceTheClearanceLetsTheCameraThrough) {
@@ -106,7 +106,7 @@ TEST_F(RoomSpace, IncidenceRangeAndElevationLimitWhatIsSeen) {
             ASSERT_LT((samples.points[i] - Eigen::Vector3f(1, 1, 1)).norm(), 1.5F + 0.18F);
         }
     }
-    EXPECT_GT(near.count, 100U);
+    EXPECT_GT(near.count, 30U);
 }
 
 TEST_F(RoomSpace, ABadStartIsNamed) {
@@ -141,6 +141,8 @@ TEST_F(RoomSpace, TheCacheReturnsTheSameSetAndSurvivesDamage) {
     EXPECT_FALSE(first.fromCache);
     EXPECT_TRUE(second.fromCache);
     EXPECT_EQ(first.observable, second.observable);
+    space_.start = {1.2, 2, 1.5};
+    EXPECT_TRUE(observe().fromCache) << "the start does not matter within a connected space";
     space_.clearance = 0.21;
     EXPECT_FALSE(observe().fromCache) << "another view space is another set";
     space_.clearance = 0.2;

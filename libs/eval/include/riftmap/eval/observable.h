@@ -28,13 +28,13 @@ struct ViewSpace {
 ViewSpace viewSpaceOf(const PlatformLimits& limits, const StereoCamera& camera,
                       const Eigen::Vector3d& start);
 
-/// Positions of the camera: a grid through the start, flooded from it. A node is reachable if a
+/// Positions of the camera: a grid over the box, flooded from the start. A node is reachable if a
 /// chain of grid steps that keep the clearance all along leads to it.
 class ReachableSpace {
  public:
-    /// Throws std::runtime_error if the start is outside the box or nearer than the clearance to
-    /// a surface. `grid` [m]; 0 = half the clearance within [0.02, 0.1]; it grows where the box
-    /// would take more than 2^24 nodes.
+    /// Throws std::runtime_error if the start is outside the box, nearer than the clearance to a
+    /// surface, or in a nook from which no node of the grid can be reached. `grid` [m]; 0 = half
+    /// the clearance within [0.02, 0.1]; it grows where the box would take more than 2^24 nodes.
     ReachableSpace(const RayCaster& caster, const ViewSpace& space, double grid);
 
     double grid() const { return grid_; }
@@ -59,7 +59,8 @@ class ReachableSpace {
     Eigen::Vector3d position(std::size_t node) const;
     std::ptrdiff_t nearestNode(const Eigen::Vector3d& place) const;
     bool stepClear(std::size_t a, std::size_t b) const;
-    void flood(std::size_t start);
+    std::vector<std::size_t> nodesAround(const Eigen::Vector3d& place) const;
+    void flood(std::vector<std::size_t> queue);
 
     const RayCaster* caster_;
     ViewSpace space_;
