@@ -37,9 +37,7 @@ void ImportProgram::run() {
         throw ConfigError(format + " takes " + std::to_string(wanted) + " INPUT, " +
                           std::to_string(given.size() - 1) + " given");
     }
-    if (std::filesystem::exists(requiredOut()) && !overwrite()) {
-        throw ConfigError(out().string() + ": exists already; -w overwrites it");
-    }
+    checkMayWrite(requiredOut());
     if (!calibration_.empty()) {
         pair_ = readMiddleburyCalibration(calibration_);
     }

@@ -202,19 +202,6 @@ cv::Mat pixels(const mrpt::img::CImage& image, const std::filesystem::path& fold
     return result;
 }
 
-std::string sizeText(int width, int height) {
-    return std::to_string(width) + "x" + std::to_string(height);
-}
-
-void checkSize(const cv::Mat& image, const mrpt::img::TCamera& camera, const char* side) {
-    if (static_cast<int>(camera.ncols) != image.cols ||
-        static_cast<int>(camera.nrows) != image.rows) {
-        throw Nonsense(std::string("the ") + side + " image is " +
-                       sizeText(image.cols, image.rows) + " px, its calibration says " +
-                       sizeText(static_cast<int>(camera.ncols), static_cast<int>(camera.nrows)));
-    }
-}
-
 }  // namespace
 
 void RawlogOptions::describe(OptionTable& table) {
@@ -288,7 +275,6 @@ class RawlogReader::Impl {
         while (const auto pair = nextSelected()) {
             try {
                 if (auto observation = convert(*pair)) {
-                    recorded_ = pair;
                     return observation;
                 }
             } catch (const Nonsense& e) {
@@ -312,8 +298,6 @@ class RawlogReader::Impl {
 
     const RawlogContents& contents() const { return contents_; }
     std::size_t withoutPose() const { return withoutPose_; }
-    CObservationStereoImages::Ptr recorded() const { return recorded_; }
-    Pose world_T_robot() const { return world_T_robot_; }
 
  private:
     /// The file is unusable: the damage, where there is some, is the better explanation.
@@ -405,7 +389,6 @@ class RawlogReader::Impl {
         StereoObservation observation;
         observation.time_ns = time;
         const Pose robot_T_camera = cameraOnRobot(pair) * rectify(pair, observation);
-        world_T_robot_ = posesOfCamera_ ? *pose * robot_T_camera.inverse() : *pose;
         observation.world_T_camera = posesOfCamera_ ? *pose : *pose * robot_T_camera;
         return observation;
     }
@@ -441,12 +424,6 @@ class RawlogReader::Impl {
         }
         const cv::Mat left = pixels(pair.imageLeft, images_);
         const cv::Mat right = pixels(pair.imageRight, images_);
-        if (left.size() != right.size()) {
-            throw Nonsense("the left image is " + sizeText(left.cols, left.rows) +
-                           " px, the right one " + sizeText(right.cols, right.rows));
-        }
-        checkSize(left, pair.leftCamera, "left");
-        checkSize(right, pair.rightCamera, "right");
         RectifiedPair rectified;
         rectifier_.rectify(pair.getStereoCameraParams(), left, right, rectified);
         observation.left = rectified.left;
@@ -498,8 +475,6 @@ class RawlogReader::Impl {
     std::size_t index_ = 0, taken_ = 0, withoutPose_ = 0;
     std::int64_t lastTime_ = std::numeric_limits<std::int64_t>::min();
     Rectifier rectifier_;
-    CObservationStereoImages::Ptr recorded_;
-    Pose world_T_robot_;
 };
 
 RawlogReader::RawlogReader(const std::filesystem::path& file, const RawlogOptions& options,
@@ -511,12 +486,6 @@ RawlogReader& RawlogReader::operator=(RawlogReader&&) noexcept = default;
 
 std::optional<StereoObservation> RawlogReader::next() {
     return impl_->next();
-}
-CObservationStereoImages::Ptr RawlogReader::recorded() const {
-    return impl_->recorded();
-}
-Pose RawlogReader::world_T_robot() const {
-    return impl_->world_T_robot();
 }
 std::size_t RawlogReader::expectedViews() const {
     return impl_->expectedViews();

@@ -82,10 +82,6 @@ class RawlogReader {
     /// that runs backwards); all pairs before that place were returned.
     std::optional<StereoObservation> next();
 
-    /// The pair that next() returned last, as recorded, and the robot's pose: for a .simplemap.
-    mrpt::obs::CObservationStereoImages::Ptr recorded() const;
-    Pose world_T_robot() const;
-
     std::size_t expectedViews() const;  ///< how many pairs the options select
     std::size_t withoutPose() const;    ///< pairs left out since no pose is known at their time
     const RawlogContents& contents() const;
