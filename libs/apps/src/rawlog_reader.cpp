@@ -447,8 +447,11 @@ class RawlogReader::Impl {
             throw Nonsense(labelled(pair) + " has disparity of images that are not rectified");
         }
         observation.left = pixels(pair.imageLeft, images_);
-        checkSize(observation.left, pair.leftCamera, "left");
         const mrpt::img::TCamera& left = pair.leftCamera;
+        if (observation.left.cols != static_cast<int>(left.ncols) ||
+            observation.left.rows != static_cast<int>(left.nrows)) {
+            throw Nonsense(labelled(pair) + ": its image does not have its calibration's size");
+        }
         observation.camera = {static_cast<int>(left.ncols),
                               static_cast<int>(left.nrows),
                               left.fx(),
