@@ -61,10 +61,10 @@ void window(MeshBuilder& b, const Rectangle& bay, const Rectangle& o) {
     const double depth = 0.3;
     b.material(wallStone());
     plateWithOpening(b, bay, o);
-    b.quad({o.x0, 0, o.z0}, {o.x0, 0, o.z1}, {o.x0, depth, o.z1}, {o.x0, depth, o.z0});
-    b.quad({o.x1, 0, o.z0}, {o.x1, depth, o.z0}, {o.x1, depth, o.z1}, {o.x1, 0, o.z1});
-    b.quad({o.x0, 0, o.z0}, {o.x0, depth, o.z0}, {o.x1, depth, o.z0}, {o.x1, 0, o.z0});
-    b.quad({o.x0, 0, o.z1}, {o.x1, 0, o.z1}, {o.x1, depth, o.z1}, {o.x0, depth, o.z1});
+    b.quad({o.x0, depth, o.z0}, {o.x0, depth, o.z1}, {o.x0, 0, o.z1}, {o.x0, 0, o.z0});
+    b.quad({o.x1, 0, o.z1}, {o.x1, depth, o.z1}, {o.x1, depth, o.z0}, {o.x1, 0, o.z0});
+    b.quad({o.x1, 0, o.z0}, {o.x1, depth, o.z0}, {o.x0, depth, o.z0}, {o.x0, 0, o.z0});
+    b.quad({o.x0, depth, o.z1}, {o.x1, depth, o.z1}, {o.x1, 0, o.z1}, {o.x0, 0, o.z1});
     b.material(darkStone());
     plate(b, o, depth);
     b.material(wallStone());
@@ -97,10 +97,10 @@ void arch(MeshBuilder& b, const Rectangle& bay, double halfWidth, double spring,
     }
     b.material(darkStone());
     plate(b, {l, r, bay.z0, spring}, depth);
-    b.quad({l, 0, bay.z0}, {l, 0, spring}, {l, depth, spring}, {l, depth, bay.z0});
-    b.quad({r, 0, bay.z0}, {r, depth, bay.z0}, {r, depth, spring}, {r, 0, spring});
+    b.quad({l, depth, bay.z0}, {l, depth, spring}, {l, 0, spring}, {l, 0, bay.z0});
+    b.quad({r, 0, spring}, {r, depth, spring}, {r, depth, bay.z0}, {r, 0, bay.z0});
     b.material(paving());
-    b.quad({l, 0, bay.z0}, {l, depth, bay.z0}, {r, depth, bay.z0}, {r, 0, bay.z0});
+    b.quad({r, 0, bay.z0}, {r, depth, bay.z0}, {l, depth, bay.z0}, {l, 0, bay.z0});
 }
 
 /// A gap up to the roof with a dead end.
@@ -109,12 +109,12 @@ void alley(MeshBuilder& b, const Rectangle& bay) {
     const double r = bay.x1;
     const double depth = kAlleyDepth;
     b.material(wallStone());
-    b.quad({l, 0, 0}, {l, 0, kHeight}, {l, depth, kHeight}, {l, depth, 0});
-    b.quad({r, 0, 0}, {r, depth, 0}, {r, depth, kHeight}, {r, 0, kHeight});
+    b.quad({l, depth, 0}, {l, depth, kHeight}, {l, 0, kHeight}, {l, 0, 0});
+    b.quad({r, 0, kHeight}, {r, depth, kHeight}, {r, depth, 0}, {r, 0, 0});
     b.material(darkStone());
     plate(b, bay, depth);
     b.material(paving());
-    b.quad({l, 0, 0}, {l, depth, 0}, {r, depth, 0}, {r, 0, 0});
+    b.quad({r, 0, 0}, {r, depth, 0}, {l, depth, 0}, {l, 0, 0});
 }
 
 /// One letter a bay: w windows, a arch below and window above, n narrow arch, | alley.
