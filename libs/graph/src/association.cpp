@@ -61,18 +61,6 @@ std::atomic_ref<T> atomic(T& value) {
 
 }  // namespace
 
-Association::Gate Association::gate(const ViewPoints& view, std::size_t pixel,
-                                    const GraphOptions& options) {
-    const auto gamma = static_cast<float>(options.gamma);
-    if (options.fusion == GraphOptions::Fusion::kFirst) {
-        return {gamma, gamma};
-    }
-    // Never below what the noise and the sampling at that depth blur anyway.
-    const float spacing = 0.75F * view.z[pixel] * view.footprint;
-    return {std::max(gamma, spacing),
-            std::max({gamma, kNoiseGate * view.sigma[pixel], spacing * view.stretch[pixel]})};
-}
-
 void Association::computeReach(const ViewPoints& view, const GraphOptions& options) {
     tileColumns_ = (view.width + kTile - 1) / kTile;
     tileRows_ = (view.height + kTile - 1) / kTile;
@@ -136,6 +124,7 @@ void Association::projectPage(const GraphStorage& storage, const ViewPoints& vie
         const std::uint32_t k = which * Page::kSize + slot;
         Candidate& candidate = candidates[k];
         candidate.z = 0;
+        pixelOf_[k] = kNone;
         best[k] = kNoBest;
         flags[k] = 0;
         areaOf[k] = 0;
@@ -155,8 +144,8 @@ void Association::projectPage(const GraphStorage& storage, const ViewPoints& vie
               v < bottom + kBorder)) {
             continue;
         }
-        const int column = std::clamp(static_cast<int>(std::lround(u)), 0, view.width - 1);
-        const int row = std::clamp(static_cast<int>(std::lround(v)), 0, view.height - 1);
+        const int column = std::clamp(compact::roundPixel(u), 0, view.width - 1);
+        const int row = std::clamp(compact::roundPixel(v), 0, view.height - 1);
         const std::size_t tile =
             static_cast<std::size_t>(row / kTile) * static_cast<std::size_t>(tileColumns_) +
             static_cast<std::size_t>(column / kTile);
@@ -165,8 +154,9 @@ void Association::projectPage(const GraphStorage& storage, const ViewPoints& vie
             continue;  // hidden behind everything the view shows there
         }
         candidate = {u, v, z, sigma};
-        atomic(occupied_[tile]).store(1, std::memory_order_relaxed);
-        next_[k] = atomic(head_[view.index(column, row)]).exchange(k, std::memory_order_relaxed);
+        const std::size_t pixel = view.index(column, row);
+        pixelOf_[k] = static_cast<std::uint32_t>(pixel);
+        atomic(start_[pixel]).fetch_add(1, std::memory_order_relaxed);
     }
 }
 
@@ -179,117 +169,134 @@ void Association::project(const GraphStorage& storage, const ViewPoints& view,
     best.resize(n);
     flags.resize(n);
     areaOf.resize(n);
-    next_.resize(n);
-    head_.assign(view.z.size(), kNone);
-    occupied_.assign(reach_.size(), 0);
+    pixelOf_.resize(n);
+    start_.assign(view.z.size() + 1, 0);
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, pages.size(), 16),
                       [&](const tbb::blocked_range<std::size_t>& range) {
                           for (std::size_t i = range.begin(); i != range.end(); ++i) {
                               projectPage(storage, view, static_cast<std::uint32_t>(i));
                           }
                       });
+    sortByPixel();
 }
 
-std::uint32_t Association::matchPixel(const ViewPoints& view, const GraphOptions& options,
-                                      int column, int row) {
-    const std::size_t pixel = view.index(column, row);
-    const float depth = view.z[pixel];
-    const Gate g = gate(view, pixel, options);
-    const bool paper = options.fusion == GraphOptions::Fusion::kFirst;
-    const float perPixel = depth * view.footprint;  // lateral [m] a pixel
-    const int radius = static_cast<int>(g.lateral / perPixel + 0.5F) + 1;
-    const Eigen::Vector3f point = view.inCamera(column, row, depth);
-    std::uint32_t found = kNone;
-    float least = std::numeric_limits<float>::infinity();
+void Association::sortByPixel() {
+    // start_ holds counts now. Each pixel's end first; placing its entries moves it to their start.
+    std::uint32_t sum = 0;
+    for (std::uint32_t& start : start_) {
+        sum += start;
+        start = sum;
+    }
+    constexpr std::size_t kPadding = 64;  // the kernel reads whole vectors
+    for (auto* values : {&entryU_, &entryV_, &entryZ_, &entryNoise_}) {
+        values->resize(sum + kPadding);
+    }
+    entryCandidate_.resize(sum + kPadding);
+    // The order within a pixel depends on the threads; matching does not depend on that order.
+    tbb::parallel_for(
+        tbb::blocked_range<std::size_t>(0, pixelOf_.size(), 4096),
+        [&](const tbb::blocked_range<std::size_t>& range) {
+            for (std::size_t k = range.begin(); k != range.end(); ++k) {
+                if (pixelOf_[k] == kNone) {
+                    continue;
+                }
+                const std::uint32_t at =
+                    atomic(start_[pixelOf_[k]]).fetch_sub(1, std::memory_order_relaxed) - 1;
+                const Candidate& o = candidates[k];
+                const float noise = kNoiseGate * o.sigma;
+                entryU_[at] = o.u;
+                entryV_[at] = o.v;
+                entryZ_[at] = o.z;
+                entryNoise_[at] = noise * noise;
+                entryCandidate_[at] = static_cast<std::int32_t>(k);
+            }
+        });
+}
 
-    const auto look = [&](int c, int r) {
-        for (std::uint32_t k = head_[view.index(c, r)]; k != kNone; k = next_[k]) {
-            const Candidate& o = candidates[k];
-            float distance = 0;
-            if (paper) {
-                const Eigen::Vector3f other((o.u - view.cx) * o.z / view.fx,
-                                            (o.v - view.cy) * o.z / view.fy, o.z);
+/// The paper's rule: the nearest vertex in space, nearer than gamma.
+void Association::matchByDistance(const ViewPoints& view, float gamma, int row, float* distance,
+                                  std::int32_t* found) const {
+    for (int column = 0; column < view.width; ++column) {
+        found[column] = -1;
+        const float depth = view.z[view.index(column, row)];
+        if (!(depth > 0)) {
+            continue;
+        }
+        const Eigen::Vector3f point = view.inCamera(column, row, depth);
+        const int radius = static_cast<int>(gamma / (depth * view.footprint)) + 2;
+        const int first = std::max(0, column - radius);
+        const int last = std::min(view.width - 1, column + radius);
+        float least = gamma * gamma;
+        for (int r = std::max(0, row - radius); r <= std::min(view.height - 1, row + radius); ++r) {
+            const std::uint32_t end = start_[view.index(last, r) + 1];
+            for (std::uint32_t e = start_[view.index(first, r)]; e < end; ++e) {
+                const float z = entryZ_[e];
+                const Eigen::Vector3f other((entryU_[e] - view.cx) * z / view.fx,
+                                            (entryV_[e] - view.cy) * z / view.fy, z);
                 const float squared = (other - point).squaredNorm();
-                if (!(squared < g.depth * g.depth)) {
-                    continue;
-                }
-                distance = squared / (g.depth * g.depth);
-            } else {
-                const float du = o.u - static_cast<float>(column);
-                const float dv = o.v - static_cast<float>(row);
-                const float lateral =
-                    (du * du + dv * dv) * perPixel * perPixel / (g.lateral * g.lateral);
-                const float noise = kNoiseGate * kNoiseGate *
-                                    (view.sigma[pixel] * view.sigma[pixel] + o.sigma * o.sigma);
-                const float along = std::max(g.depth * g.depth, noise);
-                const float behind = (o.z - depth) * (o.z - depth);
-                if (lateral > 1.0F || behind > along) {
-                    continue;
-                }
-                distance = lateral + behind / along;
-            }
-            if (distance < least || (distance == least && k < found)) {
-                least = distance;
-                found = k;
-            }
-        }
-    };
-    for (int ring = 0; ring <= radius; ++ring) {
-        // Nothing in this ring or farther out can be nearer than this.
-        const float nearest =
-            std::max(0.0F, static_cast<float>(ring) - 0.5F) * perPixel / g.lateral;
-        if (found != kNone && !paper && nearest * nearest > least) {
-            break;
-        }
-        const int top = row - ring, bottom = row + ring;
-        for (int r = std::max(0, top); r <= std::min(view.height - 1, bottom); ++r) {
-            const bool edge = r == top || r == bottom;
-            const int step = edge || ring == 0 ? 1 : 2 * ring;
-            for (int c = column - ring; c <= column + ring; c += step) {
-                if (c >= 0 && c < view.width) {
-                    look(c, r);
+                if (squared < least || (squared == least && found[column] >= 0 &&
+                                        entryCandidate_[e] < found[column])) {
+                    least = squared;
+                    found[column] = entryCandidate_[e];
                 }
             }
         }
+        distance[column] = least;
     }
-    if (found != kNone) {
-        // Positive floats order as their bits do.
-        const std::uint64_t key = (std::uint64_t{std::bit_cast<std::uint32_t>(least)} << 32U) |
-                                  static_cast<std::uint32_t>(pixel);
-        auto slot = atomic(best[found]);
-        std::uint64_t old = slot.load(std::memory_order_relaxed);
-        while (key < old && !slot.compare_exchange_weak(old, key, std::memory_order_relaxed)) {
-        }
-        const bool fine =
-            perPixel * view.stretch[pixel] <= static_cast<float>(options.targetResolution);
-        const auto flag = static_cast<std::uint8_t>(
-            (view.kinds[pixel] == 0 ? kSomeSurrounded : kSomeOpen) | (fine ? kSomeFine : 0));
-        auto flagSlot = atomic(flags[found]);
-        if ((flagSlot.load(std::memory_order_relaxed) & flag) != flag) {
-            flagSlot.fetch_or(flag, std::memory_order_relaxed);
-        }
-        atomic(areaOf[found])
-            .fetch_add(static_cast<std::uint32_t>(view.area(column, row) / kAreaUnit),
-                       std::memory_order_relaxed);
+}
+
+void Association::claim(const ViewPoints& view, float targetResolution, std::size_t pixel,
+                        std::uint32_t candidate, float distance) {
+    // Positive floats order as their bits do.
+    const std::uint64_t key = (std::uint64_t{std::bit_cast<std::uint32_t>(distance)} << 32U) |
+                              static_cast<std::uint32_t>(pixel);
+    auto slot = atomic(best[candidate]);
+    std::uint64_t old = slot.load(std::memory_order_relaxed);
+    while (key < old && !slot.compare_exchange_weak(old, key, std::memory_order_relaxed)) {
     }
-    return found;
+    const bool fine = view.z[pixel] * view.footprint * view.stretch[pixel] <= targetResolution;
+    const auto flag = static_cast<std::uint8_t>(
+        (view.kinds[pixel] == 0 ? kSomeSurrounded : kSomeOpen) | (fine ? kSomeFine : 0));
+    auto flagSlot = atomic(flags[candidate]);
+    if ((flagSlot.load(std::memory_order_relaxed) & flag) != flag) {
+        flagSlot.fetch_or(flag, std::memory_order_relaxed);
+    }
+    atomic(areaOf[candidate])
+        .fetch_add(static_cast<std::uint32_t>(view.area[pixel] / kAreaUnit),
+                   std::memory_order_relaxed);
 }
 
 void Association::match(const ViewPoints& view, const GraphOptions& options) {
     matchOf.resize(view.z.size());
     std::atomic<std::size_t> count{0};
-    tbb::parallel_for(
-        tbb::blocked_range<int>(0, view.height, 8), [&](const tbb::blocked_range<int>& range) {
-            std::size_t mine = 0;
-            for (int r = range.begin(); r != range.end(); ++r) {
-                for (int c = 0; c < view.width; ++c) {
-                    const std::size_t i = view.index(c, r);
-                    matchOf[i] = view.z[i] > 0 ? matchPixel(view, options, c, r) : kNone;
-                    mine += matchOf[i] != kNone ? 1 : 0;
+    const auto gamma = static_cast<float>(options.gamma);
+    const auto target = static_cast<float>(options.targetResolution);
+    const auto matchRows = [&](const tbb::blocked_range<int>& range) {
+        std::vector<float> distance(static_cast<std::size_t>(view.width));
+        std::vector<std::int32_t> found(static_cast<std::size_t>(view.width));
+        std::size_t mine = 0;
+        for (int r = range.begin(); r != range.end(); ++r) {
+            const std::size_t line = view.index(0, r);
+            if (options.fusion == GraphOptions::Fusion::kFirst) {
+                matchByDistance(view, gamma, r, distance.data(), found.data());
+            } else {
+                matchRow({entryU_.data(), entryV_.data(), entryZ_.data(), entryNoise_.data(),
+                          entryCandidate_.data(), start_.data(), view.width, view.height, r,
+                          view.footprint, gamma, &view.z[line], &view.sigma[line],
+                          &view.stretch[line], distance.data(), found.data()});
+            }
+            for (std::size_t c = 0; c < found.size(); ++c) {
+                matchOf[line + c] = kNone;
+                if (found[c] >= 0) {
+                    matchOf[line + c] = static_cast<std::uint32_t>(found[c]);
+                    claim(view, target, line + c, matchOf[line + c], distance[c]);
+                    ++mine;
                 }
             }
-            count.fetch_add(mine, std::memory_order_relaxed);
-        });
+        }
+        count.fetch_add(mine, std::memory_order_relaxed);
+    };
+    tbb::parallel_for(tbb::blocked_range<int>(0, view.height, 8), matchRows);
     matched = count.load();
 }
 

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "match_kernel.h"
 #include "riftmap/graph/graph_storage.h"
 #include "riftmap/graph/pixel_graph.h"
 #include "view_points.h"
@@ -54,27 +55,36 @@ class Association {
     std::size_t matched = 0;                   ///< pixels with a match
     static constexpr float kAreaUnit = 1e-9F;  ///< [m^2]
 
-    /// How far from the pixel's point a vertex may lie and still be the same surface.
-    struct Gate {
-        float lateral = 0;  ///< across the ray [m]
-        float depth = 0;    ///< along the ray, for an exactly known vertex [m]
-    };
-    static Gate gate(const ViewPoints& view, std::size_t pixel, const GraphOptions& options);
-    static constexpr float kNoiseGate = 4.0F;  ///< standard deviations that still match
+    /// The gate of a pixel. The paper's is plain gamma.
+    static Gate gate(const ViewPoints& view, std::size_t pixel, const GraphOptions& options) {
+        const auto gamma = static_cast<float>(options.gamma);
+        return options.fusion == GraphOptions::Fusion::kFirst
+                   ? Gate{gamma, gamma}
+                   : gateOf(gamma, view.z[pixel] * view.footprint, view.sigma[pixel],
+                            view.stretch[pixel]);
+    }
 
  private:
     void cull(const GraphStorage& storage, const ViewPoints& view);
     void computeReach(const ViewPoints& view, const GraphOptions& options);
     void projectPage(const GraphStorage& storage, const ViewPoints& view, std::uint32_t which);
-    std::uint32_t matchPixel(const ViewPoints& view, const GraphOptions& options, int column,
-                             int row);
+    void matchByDistance(const ViewPoints& view, float gamma, int row, float* distance,
+                         std::int32_t* found) const;
+    void claim(const ViewPoints& view, float targetResolution, std::size_t pixel,
+               std::uint32_t candidate, float distance);
 
     static constexpr int kTile = 8;
     int tileColumns_ = 0, tileRows_ = 0;
     std::vector<float> reach_;  ///< tile -> depth beyond which nothing can match there
     float farthest_ = 0;
-    std::vector<std::uint32_t> head_, next_;  ///< pixel -> list of candidates
-    std::vector<std::uint8_t> occupied_;      ///< tile -> has candidates
+    void sortByPixel();
+
+    // What matching needs of a candidate, in the order of pixels: neighbours in a row of the image
+    // are neighbours in memory.
+    std::vector<float> entryU_, entryV_, entryZ_, entryNoise_;  ///< noise: (kNoiseGate sigma)^2
+    std::vector<std::int32_t> entryCandidate_;
+    std::vector<std::uint32_t> start_;    ///< pixel -> its first entry; one more at the end
+    std::vector<std::uint32_t> pixelOf_;  ///< candidate -> pixel or kNone
 };
 
 }  // namespace riftmap

@@ -28,6 +28,7 @@ GraphStorage::GraphStorage(const GraphStorage& other)
       blockOfKey_(other.blockOfKey_),
       edgeChunks_(other.edgeChunks_),
       freeEdgeChunk_(other.freeEdgeChunk_),
+      overhang_(other.overhang_),
       vertexCount_(other.vertexCount_),
       edgeCount_(other.edgeCount_) {
     for (const auto& chunk : other.chunks_) {
@@ -116,6 +117,7 @@ VertexId GraphStorage::addVertex(std::uint32_t block) {
     p.open[slot] = 0;
     p.state[slot] = 0;
     p.neighbour[slot].fill(kNoVertex);
+    p.weight[slot].fill(0);
     ++blocks_[block].vertices;
     ++vertexCount_;
     return idOf(index, slot);
@@ -153,6 +155,11 @@ void GraphStorage::updateBounds(std::uint32_t block) {
             b.max[i] = std::max(b.max[i], p.max[i]);
         }
     }
+    for (std::size_t i = 0; i < 3 && !b.pages.empty(); ++i) {
+        const double low = b.key[i] * blockSize_, high = low + blockSize_;
+        overhang_ = std::max(
+            {overhang_, low - static_cast<double>(b.min[i]), static_cast<double>(b.max[i]) - high});
+    }
 }
 
 std::uint16_t* GraphStorage::findHalfEdge(VertexId a, VertexId b) {
@@ -181,6 +188,12 @@ std::uint16_t* GraphStorage::findHalfEdge(VertexId a, VertexId b) {
 }
 
 std::uint32_t GraphStorage::degree(VertexId id) const {
+    const Page& p = page(pageOf(id));
+    const auto& inlined = p.neighbour[slotOf(id)];
+    if ((p.state[slotOf(id)] & kOverflow) == 0) {  // free slots come last
+        return (inlined[0] != kNoVertex ? 1U : 0U) + (inlined[1] != kNoVertex ? 1U : 0U) +
+               (inlined[2] != kNoVertex ? 1U : 0U) + (inlined[3] != kNoVertex ? 1U : 0U);
+    }
     std::uint32_t n = 0;
     forEachHalfEdge(id, [&n](VertexId, std::uint16_t) { ++n; });
     return n;
@@ -284,6 +297,7 @@ void GraphStorage::setHalfEdges(VertexId a,
         p.state[slot] &= static_cast<std::uint8_t>(~kOverflow);
     }
     p.neighbour[slot].fill(kNoVertex);
+    p.weight[slot].fill(0);
     for (const auto& [n, w] : edges) {
         appendHalfEdge(a, n, w);
     }

@@ -25,7 +25,7 @@ constexpr std::uint32_t kPagesAtOnce = 16;
 constexpr int kRowsAtOnce = 8;
 constexpr int kTile = 8;
 
-/// Seconds since the last call, in ms.
+/// Time since the last call [ms].
 class StopWatch {
  public:
     double lap() {
@@ -87,11 +87,6 @@ bool lower(std::uint16_t& slot, std::uint16_t code) {
 
 }  // namespace
 
-std::int64_t areaUnits(std::uint16_t areaCode) {
-    return std::llround(static_cast<double>(compact::Area::decode(areaCode)) *
-                        kAreaUnitsPerSquareMetre);
-}
-
 MergeResult Merger::merge(const View& view, GraphStorage& storage, RiftFinder& rifts,
                           std::int64_t& area) {
     MergeResult result;
@@ -133,7 +128,7 @@ void Merger::findSeenThroughEdges(const GraphStorage& storage, std::uint32_t whi
         return points_.rotation.transpose() * (p - points_.translation);
     };
     forEachBit(page.alive, [&](std::uint32_t slot) {
-        if (!(seen_.candidates[which * Page::kSize + slot].z > 0)) {
+        if (!page.mayHaveHighEdge(slot) || !(seen_.candidates[which * Page::kSize + slot].z > 0)) {
             return;
         }
         const VertexId id = GraphStorage::idOf(index, slot);
@@ -181,7 +176,7 @@ void Merger::fuse(const View& view, Page& page, std::uint32_t slot, std::uint32_
         for (std::size_t i = 0; i < 3; ++i) {
             const float before = page.rgb[slot][i];
             page.rgb[slot][i] = static_cast<std::uint8_t>(
-                std::lround(before + gain * (static_cast<float>(colour[i]) - before)));
+                before + gain * (static_cast<float>(colour[i]) - before) + 0.5F);
         }
         const float spacing = points_.z[pixel] * points_.footprint;
         if (points_.sigma[pixel] > kNoisy * spacing) {
@@ -213,14 +208,14 @@ void Merger::fuse(const View& view, Page& page, std::uint32_t slot, std::uint32_
     if ((flags & Association::kSomeSurrounded) != 0 && (flags & Association::kSomeOpen) == 0) {
         const float area = static_cast<float>(seen_.areaOf[candidate]) * Association::kAreaUnit;
         const std::uint16_t code = compact::Area::encode(area);
-        work.area += areaUnits(code) - areaUnits(page.area[slot]);
+        work.area += compact::areaUnits(code) - compact::areaUnits(page.area[slot]);
         page.area[slot] = code;
     }
 }
 
 bool Merger::lookedThrough(const Candidate& candidate) const {
-    const int column = static_cast<int>(std::lround(candidate.u));
-    const int row = static_cast<int>(std::lround(candidate.v));
+    const int column = compact::roundPixel(candidate.u);
+    const int row = compact::roundPixel(candidate.v);
     if (column < 1 || row < 1 || column + 1 >= points_.width || row + 1 >= points_.height) {
         return false;
     }
@@ -252,17 +247,17 @@ void Merger::passOver(Page& page, std::uint32_t slot, std::uint32_t candidate, P
         return;
     }
     // Where closed surface shows at this vertex, the pixels there stand for its share already.
-    const int column = static_cast<int>(std::lround(seen.u));
-    const int row = static_cast<int>(std::lround(seen.v));
+    const int column = compact::roundPixel(seen.u);
+    const int row = compact::roundPixel(seen.v);
     if (column < 0 || row < 0 || column >= points_.width || row >= points_.height) {
         return;
     }
     const std::size_t i = points_.index(column, row);
-    const float near = std::max(Association::gate(points_, i, options_).depth,
-                                Association::kNoiseGate * seen.sigma);
+    const float near =
+        std::max(Association::gate(points_, i, options_).depth, kNoiseGate * seen.sigma);
     if (points_.z[i] > 0 && points_.kinds[i] == 0 && page.area[slot] != 0 &&
         std::abs(points_.z[i] - seen.z) <= near) {
-        work.area -= areaUnits(page.area[slot]);
+        work.area -= compact::areaUnits(page.area[slot]);
         page.area[slot] = 0;
     }
 }
@@ -270,6 +265,18 @@ void Merger::passOver(Page& page, std::uint32_t slot, std::uint32_t candidate, P
 void Merger::fusePage(const View& view, GraphStorage& storage, std::uint32_t which) {
     Page& page = storage.page(seen_.pages[which]);
     PageWork& work = work_[which];
+    forEachBit(page.alive, [&](std::uint32_t slot) {  // the pixels lie apart in memory
+        const std::uint32_t pixel = seen_.bestPixel(which * Page::kSize + slot);
+        if (pixel != Association::kNone) {
+            __builtin_prefetch(&points_.z[pixel]);
+            __builtin_prefetch(&points_.sigma[pixel]);
+            __builtin_prefetch(&points_.disparity[pixel]);
+            __builtin_prefetch(&points_.kinds[pixel]);
+            if (!view.image.empty()) {
+                __builtin_prefetch(view.image.data + pixel * view.image.elemSize());
+            }
+        }
+    });
     forEachBit(page.alive, [&](std::uint32_t slot) {
         const std::uint32_t candidate = which * Page::kSize + slot;
         if (!(seen_.candidates[candidate].z > 0)) {
@@ -312,7 +319,7 @@ void Merger::deleteSeenThrough(GraphStorage& storage, RiftFinder& rifts, MergeRe
                 ++result.deletedEdges;
                 touch(n);
             });
-            work_[i].area -= areaUnits(storage.page(index).area[slot]);
+            work_[i].area -= compact::areaUnits(storage.page(index).area[slot]);
             storage.removeVertex(id);
             ++result.deletedVertices;
         });
@@ -367,7 +374,7 @@ void Merger::grow(const View& view, GraphStorage& storage, MergeResult& result) 
         page.y[slot] = p.y();
         page.z[slot] = p.z();
         page.sigma[slot] = compact::Sigma::encode(std::max(points_.sigma[pixel], kLeastSigma));
-        page.area[slot] = compact::Area::encode(points_.area(column, row));
+        page.area[slot] = compact::Area::encode(points_.area[pixel]);
         page.rgb[slot] = colourAt(view.image, pixel, points_.width);
         const bool fine = points_.z[pixel] * points_.footprint * points_.stretch[pixel] <=
                           static_cast<float>(options_.targetResolution);
@@ -510,7 +517,7 @@ void Merger::finish(GraphStorage& storage, RiftFinder& rifts, std::int64_t& area
     for (const std::uint32_t pixel : fresh_) {
         const std::uint32_t index = GraphStorage::pageOf(vertexOf_[pixel]);
         const Page& page = storage.page(index);
-        area += areaUnits(page.area[GraphStorage::slotOf(vertexOf_[pixel])]);
+        area += compact::areaUnits(page.area[GraphStorage::slotOf(vertexOf_[pixel])]);
         if (freshPages_.empty() || freshPages_.back() != index) {
             freshPages_.push_back(index);
             rifts.touch(page.block);

@@ -13,16 +13,12 @@
 
 namespace riftmap {
 
-/// Surface of the map in whole units, so that the order of adding does not matter.
-std::int64_t areaUnits(std::uint16_t areaCode);
-inline constexpr double kAreaUnitsPerSquareMetre = 1e12;
-
 /// Merges views; keeps its buffers from one to the next.
 class Merger {
  public:
     explicit Merger(const GraphOptions& options) : options_(options) {}
 
-    /// The view must have been checked. `area` is kept up to date [area units].
+    /// The view must have been checked. `area` is kept up to date [compact::areaUnits].
     MergeResult merge(const View& view, GraphStorage& storage, RiftFinder& rifts,
                       std::int64_t& area);
     const MergeTimes& times() const { return times_; }
@@ -31,7 +27,7 @@ class Merger {
  private:
     /// What a page's vertices ask for while they are fused in parallel.
     struct PageWork {
-        std::int64_t area = 0;                           ///< change [area units]
+        std::int64_t area = 0;                           ///< change [compact::areaUnits]
         std::uint64_t moved = 0;                         ///< slots whose position changed
         std::uint64_t doomed = 0;                        ///< slots to delete
         bool touched = false;                            ///< rifts must be looked at again

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "riftmap/graph/pixel_graph.h"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
@@ -78,7 +79,7 @@ std::size_t PixelGraph::memoryBytes() const {
 }
 
 double PixelGraph::surfaceArea() const {
-    return static_cast<double>(impl_->area) / kAreaUnitsPerSquareMetre;
+    return static_cast<double>(impl_->area) / compact::kAreaUnitsPerSquareMetre;
 }
 
 void PixelGraph::clear() {
@@ -97,6 +98,15 @@ std::optional<VertexId> PixelGraph::nearest(const Eigen::Vector3f& point, float 
     float least = radius * radius;
     VertexId found = kNoVertex;
     forEachPageIn(point - reach, point + reach, [&](std::uint32_t index, const Page& page) {
+        float outside = 0;  // squared distance to the page's box
+        for (std::size_t i = 0; i < 3; ++i) {
+            const float p = point[static_cast<Eigen::Index>(i)];
+            const float d = std::max({0.0F, page.min[i] - p, p - page.max[i]});
+            outside += d * d;
+        }
+        if (outside > least) {
+            return;
+        }
         forEachBit(page.alive, [&](std::uint32_t s) {
             const float dx = page.x[s] - point.x();
             const float dy = page.y[s] - point.y();

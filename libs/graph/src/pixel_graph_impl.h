@@ -17,7 +17,7 @@ class PixelGraph::Impl {
     RiftFinder rifts;
     Merger merger;
     std::size_t rawPoints = 0;
-    std::int64_t area = 0;  ///< [area units]
+    std::int64_t area = 0;  ///< [compact::areaUnits]
 };
 
 }  // namespace riftmap

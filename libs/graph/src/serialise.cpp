@@ -332,8 +332,8 @@ void PixelGraph::load(std::istream& in) {
     }
     fresh->storage.rebuild();
     fresh->storage.forEachVertex([&](VertexId id) {
-        fresh->area +=
-            areaUnits(fresh->storage.page(GraphStorage::pageOf(id)).area[GraphStorage::slotOf(id)]);
+        fresh->area += compact::areaUnits(
+            fresh->storage.page(GraphStorage::pageOf(id)).area[GraphStorage::slotOf(id)]);
     });
 
     std::vector<Rift> rifts;

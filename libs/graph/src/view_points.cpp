@@ -3,7 +3,6 @@
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
-#include <tbb/parallel_reduce.h>
 
 #include <Eigen/LU>
 #include <algorithm>
@@ -14,11 +13,11 @@ namespace {
 
 constexpr float kLargestStretch = 10.0F;  // beyond 84 degrees nothing is explained by the angle
 constexpr float kNoiseFactor = 3.0F;      // what noise explains, in standard deviations
-constexpr float kRowsAtOnce = 16;
+constexpr int kRowsAtOnce = 16;
 
 template <class F>
 void forEachRow(int rows, F&& f) {
-    tbb::parallel_for(tbb::blocked_range<int>(0, rows, static_cast<int>(kRowsAtOnce)),
+    tbb::parallel_for(tbb::blocked_range<int>(0, rows, kRowsAtOnce),
                       [&](const tbb::blocked_range<int>& range) {
                           for (int r = range.begin(); r != range.end(); ++r) {
                               f(r);
@@ -26,31 +25,30 @@ void forEachRow(int rows, F&& f) {
                       });
 }
 
-/// Least-squares plane over pixels (dc, dr, disparity).
+/// Least-squares plane d = a x + b y + e over pixels.
 struct PlaneSums {
-    double n = 0, c = 0, r = 0, d = 0, cc = 0, cr = 0, rr = 0, cd = 0, rd = 0;
-    void add(double dc, double dr, double disparity) {
+    float n = 0, x = 0, y = 0, d = 0, xx = 0, xy = 0, yy = 0, xd = 0, yd = 0;
+    void add(float px, float py, float pd) {
         n += 1;
-        c += dc;
-        r += dr;
-        d += disparity;
-        cc += dc * dc;
-        cr += dc * dr;
-        rr += dr * dr;
-        cd += dc * disparity;
-        rd += dr * disparity;
+        x += px;
+        y += py;
+        d += pd;
+        xx += px * px;
+        xy += px * py;
+        yy += py * py;
+        xd += px * pd;
+        yd += py * pd;
     }
-    bool solve(PatchPlane& plane) const {
-        const double vcc = cc - c * c / n, vcr = cr - c * r / n, vrr = rr - r * r / n;
-        const double vcd = cd - c * d / n, vrd = rd - r * d / n;
-        const double det = vcc * vrr - vcr * vcr;
-        if (!(det > 1e-3 * n * n)) {
+    bool solve(float& a, float& b, float& e) const {
+        const float vxx = xx - x * x / n, vxy = xy - x * y / n, vyy = yy - y * y / n;
+        const float vxd = xd - x * d / n, vyd = yd - y * d / n;
+        const float det = vxx * vyy - vxy * vxy;
+        if (!(det > 1e-3F * n * n)) {
             return false;  // all in a line
         }
-        const double a = (vcd * vrr - vrd * vcr) / det, b = (vrd * vcc - vcd * vcr) / det;
-        plane.slopeColumn = static_cast<float>(a);
-        plane.slopeRow = static_cast<float>(b);
-        plane.value = static_cast<float>((d - a * c - b * r) / n);
+        a = (vxd * vyy - vyd * vxy) / det;
+        b = (vyd * vxx - vxd * vxy) / det;
+        e = (d - a * x - b * y) / n;
         return true;
     }
 };
@@ -72,7 +70,17 @@ void ViewPoints::build(const View& view, const GraphOptions& options) {
     const auto n = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
     z.resize(n);
     sigma.resize(n);
+    disparity.resize(n);
     stretch.resize(n);
+    area.resize(n);
+    rayX_.resize(static_cast<std::size_t>(width));
+    rayY_.resize(static_cast<std::size_t>(height));
+    for (int c = 0; c < width; ++c) {
+        rayX_[static_cast<std::size_t>(c)] = (static_cast<float>(c) - cx) / fx;
+    }
+    for (int r = 0; r < height; ++r) {
+        rayY_[static_cast<std::size_t>(r)] = (static_cast<float>(r) - cy) / fy;
+    }
     right.resize(n);
     down.resize(n);
     kinds.resize(n);
@@ -86,19 +94,7 @@ void ViewPoints::build(const View& view, const GraphOptions& options) {
             fitPatch(view.disparity, c, r);
         }
     });
-    forEachRow(height, [&](int r) {
-        for (int c = 0; c < width; ++c) {
-            const PatchPlane& p = patch(c, r);
-            const std::size_t i = index(c, r);
-            stretch[i] = 1.0F;
-            if (z[i] > 0 && onPatch(c, r)) {
-                const Eigen::Vector3f ray = inCamera(c, r, 1.0F);
-                // cos = |n . ray| / |ray| and z = distance / (n . ray)
-                stretch[i] =
-                    std::clamp(p.inverseDistance * z[i] * ray.norm(), 1.0F, kLargestStretch);
-            }
-        }
-    });
+    forEachRow(height, [&](int r) { computeAngles(r); });
     forEachRow(height, [&](int r) { computeEdges(options, r); });
     forEachRow(height, [&](int r) { computeKinds(options, view.disparity.firstColumn, r); });
     validCount = static_cast<std::size_t>(
@@ -117,6 +113,25 @@ void ViewPoints::computeDepth(const View& view, int row) {
         const bool ok = std::isfinite(d) && d > 0 && s >= 0 && kNoiseFactor * s < depth;
         z[i] = ok ? depth : 0.0F;
         sigma[i] = ok ? s : 0.0F;
+        disparity[i] = d;
+    }
+}
+
+void ViewPoints::computeAngles(int row) {
+    const float y = rayY_[static_cast<std::size_t>(row)];
+    for (int c = 0; c < width; ++c) {
+        const std::size_t i = index(c, row);
+        const PatchPlane& p = patch(c, row);
+        const float x = rayX_[static_cast<std::size_t>(c)];
+        const float ray = std::sqrt(x * x + y * y + 1.0F);
+        float angle = 1.0F;
+        if (z[i] > 0 && onPatch(c, row)) {
+            // cos = |n . ray| / |ray| and z = distance / (n . ray)
+            angle = std::clamp(p.inverseDistance * z[i] * ray, 1.0F, kLargestStretch);
+        }
+        stretch[i] = angle;
+        // z^2 / (fx fy |n . ray|), where 1 / |n . ray| = stretch / |ray|
+        area[i] = z[i] * z[i] * angle / (fx * fy * ray);
     }
 }
 
@@ -131,40 +146,46 @@ void ViewPoints::fitPatch(const DisparityImage& image, int patchColumn, int patc
     if (!(z[centre] > 0)) {
         return;
     }
-    const float d0 = fb / z[centre];
+    const float d0 = disparity[centre];
     const float sd = image.sigma[centre];
     // Where noise hides the slope between neighbours, look farther.
     const bool noisy = sigma[centre] > 0.25F * z[centre] * footprint;
-    const int radius = noisy ? 6 : 2, step = noisy ? 2 : 1;
+    const int radius = noisy ? 6 : 2, step = noisy ? 3 : 1;
     const float steepest = kLargestStretch * fb / (fx * z[centre]);
-    const auto collect = [&](auto&& keep) {
+    const int dcFirst = std::max(-radius, -plane.column / step * step);
+    const int dcLast = std::min(radius, width - 1 - plane.column);
+    const int drFirst = std::max(-radius, -plane.row / step * step);
+    const int drLast = std::min(radius, height - 1 - plane.row);
+    const auto collect = [&](auto&& expected, float tolerance) {
         PlaneSums sums;
-        for (int dr = -radius; dr <= radius; dr += step) {
-            for (int dc = -radius; dc <= radius; dc += step) {
-                const int c = plane.column + dc, r = plane.row + dr;
-                if (c < 0 || r < 0 || c >= width || r >= height || !(z[index(c, r)] > 0)) {
-                    continue;
-                }
-                const float d = fb / z[index(c, r)];
-                if (keep(c, r, d)) {
-                    sums.add(dc, dr, static_cast<double>(d));
+        for (int dr = drFirst; dr <= drLast; dr += step) {
+            const std::size_t i = index(plane.column, plane.row + dr);
+            for (int dc = dcFirst; dc <= dcLast; dc += step) {
+                const std::size_t j = i + static_cast<std::size_t>(dc);
+                const auto x = static_cast<float>(dc), y = static_cast<float>(dr);
+                const float d = disparity[j] - d0;
+                if (z[j] > 0 && std::abs(d - expected(x, y)) <= tolerance) {
+                    sums.add(x, y, d);
                 }
             }
         }
         return sums;
     };
-    const float gate = 4.0F * sd + steepest * static_cast<float>(radius);
-    const double least = noisy ? 16 : 8;
-    PlaneSums sums = collect([&](int, int, float d) { return std::abs(d - d0) <= gate; });
-    if (sums.n < least || !sums.solve(plane)) {
-        return;
-    }
+    const float least = 9;
     const float tolerance = 3.0F * sd + 0.05F;
-    sums = collect(
-        [&](int c, int r, float d) { return std::abs(d - plane.disparity(c, r)) <= tolerance; });
-    if (sums.n < least || !sums.solve(plane)) {
+    float a = 0, b0 = 0, e = 0;
+    PlaneSums sums = collect([](float, float) { return 0.0F; },
+                             4.0F * sd + steepest * static_cast<float>(radius));
+    if (sums.n < least || !sums.solve(a, b0, e)) {
         return;
     }
+    sums = collect([&](float x, float y) { return e + a * x + b0 * y; }, tolerance);
+    if (sums.n < least || !sums.solve(a, b0, e)) {
+        return;
+    }
+    plane.slopeColumn = a;
+    plane.slopeRow = b0;
+    plane.value = d0 + e;
     // n / distance of the plane n . X = distance, from disparity = fb (n . ray) / distance.
     const float b = fb / fx;
     const Eigen::Vector3f scaled(
@@ -177,17 +198,6 @@ void ViewPoints::fitPatch(const DisparityImage& image, int patchColumn, int patc
     plane.tolerance = tolerance;
 }
 
-bool ViewPoints::onPatch(int column, int row) const {
-    const PatchPlane& p = patch(column, row);
-    return std::abs(fb / z[index(column, row)] - p.disparity(column, row)) <= p.tolerance;
-}
-
-float ViewPoints::area(int column, int row) const {
-    const std::size_t i = index(column, row);
-    // z^2 / (fx fy |n . ray|), where 1 / |n . ray| = stretch / |ray|
-    return z[i] * z[i] * stretch[i] / (fx * fy * inCamera(column, row, 1.0F).norm());
-}
-
 bool ViewPoints::explained(int c, int r, int c2, int r2, float tolerance) const {
     const PatchPlane& p = patch(c, r);
     const float d = p.disparity(c2, r2);
@@ -195,31 +205,46 @@ bool ViewPoints::explained(int c, int r, int c2, int r2, float tolerance) const 
            std::abs(fb / d - z[index(c2, r2)]) <= tolerance && onPatch(c, r);
 }
 
-std::uint16_t ViewPoints::edge(const GraphOptions& options, int c, int r, int c2, int r2) const {
-    const std::size_t i = index(c, r), j = index(c2, r2);
-    if (!(z[i] > 0) || !(z[j] > 0)) {
-        return kNoEdge;
-    }
-    const float weight = (inCamera(c, r, z[i]) - inCamera(c2, r2, z[j])).norm();  // eq. (3)
-    bool high = false;
+bool ViewPoints::isHigh(const GraphOptions& options, float squared, int c, int r, int c2,
+                        int r2) const {
     if (options.delta > 0) {
-        high = weight > static_cast<float>(options.delta);
-    } else {
-        const float noise = kNoiseFactor * std::sqrt(sigma[i] * sigma[i] + sigma[j] * sigma[j]);
-        const float tolerance = static_cast<float>(options.targetResolution) + noise;
-        const float spacing = footprint * std::max(z[i], z[j]);
-        high = weight > tolerance + spacing && !explained(c, r, c2, r2, tolerance) &&
-               !explained(c2, r2, c, r, tolerance);
+        return squared > static_cast<float>(options.delta * options.delta);
     }
-    const auto code = std::min<std::uint16_t>(compact::Weight::encode(weight), 0x7FFE);
-    return static_cast<std::uint16_t>(code | (high ? compact::kHighBit : 0));
+    const std::size_t i = index(c, r), j = index(c2, r2);
+    const auto target = static_cast<float>(options.targetResolution);
+    const float spacing = footprint * std::max(z[i], z[j]);
+    if (squared <= (target + spacing) * (target + spacing)) {
+        return false;
+    }
+    const float noise = kNoiseFactor * std::sqrt(sigma[i] * sigma[i] + sigma[j] * sigma[j]);
+    const float tolerance = target + noise;
+    return squared > (tolerance + spacing) * (tolerance + spacing) &&
+           !explained(c, r, c2, r2, tolerance) && !explained(c2, r2, c, r, tolerance);
 }
 
 void ViewPoints::computeEdges(const GraphOptions& options, int row) {
+    const float y = rayY_[static_cast<std::size_t>(row)];
+    const float y2 = row + 1 < height ? rayY_[static_cast<std::size_t>(row) + 1] : y;
+    const auto code = [&](int c, int c2, int r2, float ya) -> std::uint16_t {
+        if (c2 >= width || r2 >= height) {
+            return kNoEdge;
+        }
+        const std::size_t i = index(c, row), j = index(c2, r2);
+        if (!(z[i] > 0) || !(z[j] > 0)) {
+            return kNoEdge;
+        }
+        const float dx =
+            rayX_[static_cast<std::size_t>(c2)] * z[j] - rayX_[static_cast<std::size_t>(c)] * z[i];
+        const float dy = ya * z[j] - y * z[i], dz = z[j] - z[i];
+        const float squared = dx * dx + dy * dy + dz * dz;
+        const std::uint16_t weight =  // eq. (3)
+            std::min<std::uint16_t>(compact::Weight::encode(std::sqrt(squared)), 0x7FFE);
+        return static_cast<std::uint16_t>(
+            weight | (isHigh(options, squared, c, row, c2, r2) ? compact::kHighBit : 0));
+    };
     for (int c = 0; c < width; ++c) {
-        const std::size_t i = index(c, row);
-        right[i] = c + 1 < width ? edge(options, c, row, c + 1, row) : kNoEdge;
-        down[i] = row + 1 < height ? edge(options, c, row, c, row + 1) : kNoEdge;
+        right[index(c, row)] = code(c, c + 1, row, y);
+        down[index(c, row)] = code(c, c, row + 1, y2);
     }
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -45,7 +46,9 @@ class ViewPoints {
 
     std::vector<float> z;                    ///< depth [m]; 0 = no vertex
     std::vector<float> sigma;                ///< standard deviation of z [m]
+    std::vector<float> disparity;            ///< fb / z [px]; only where z > 0
     std::vector<float> stretch;              ///< 1 / cos of the viewing angle, in [1, 10]
+    std::vector<float> area;                 ///< surface that the pixel stands for [m^2]
     std::vector<std::uint16_t> right, down;  ///< weight code of the edge there, or kNoEdge
     std::vector<std::uint8_t> kinds;         ///< OpenKind bits but kTooCoarse
     std::vector<PatchPlane> patches;         ///< a plane a patch, row-major
@@ -68,19 +71,22 @@ class ViewPoints {
         return rotation * inCamera(column, row, z[index(column, row)]) + translation;
     }
     /// True if the pixel lies on the plane of its patch.
-    bool onPatch(int column, int row) const;
-    /// Surface that a pixel stands for [m^2].
-    float area(int column, int row) const;
+    bool onPatch(int column, int row) const {
+        const PatchPlane& p = patch(column, row);
+        return std::abs(disparity[index(column, row)] - p.disparity(column, row)) <= p.tolerance;
+    }
 
  private:
     void computeDepth(const View& view, int row);
     void fitPatch(const DisparityImage& disparity, int patchColumn, int patchRow);
+    void computeAngles(int row);
     void computeEdges(const GraphOptions& options, int row);
     void computeKinds(const GraphOptions& options, int firstColumn, int row);
-    std::uint16_t edge(const GraphOptions& options, int c, int r, int c2, int r2) const;
+    bool isHigh(const GraphOptions& options, float squared, int c, int r, int c2, int r2) const;
     bool explained(int c, int r, int c2, int r2, float tolerance) const;
 
     int patchColumns_ = 0;
+    std::vector<float> rayX_, rayY_;  ///< (c - cx) / fx of a column, (r - cy) / fy of a row
 };
 
 }  // namespace riftmap

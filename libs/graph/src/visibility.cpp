@@ -25,8 +25,8 @@ bool seenThrough(const ViewPoints& view, const Eigen::Vector3f& a, const Eigen::
     if (!(std::max({std::abs(ua), std::abs(va), std::abs(ub), std::abs(vb)}) < longest)) {
         return false;  // most of it lies outside the image
     }
-    const int ca = static_cast<int>(std::lround(ua)), ra = static_cast<int>(std::lround(va));
-    const int cb = static_cast<int>(std::lround(ub)), rb = static_cast<int>(std::lround(vb));
+    const int ca = compact::roundPixel(ua), ra = compact::roundPixel(va);
+    const int cb = compact::roundPixel(ub), rb = compact::roundPixel(vb);
     const bool paper = options.fusion == GraphOptions::Fusion::kFirst;
     const int length = std::max(std::abs(cb - ca), std::abs(rb - ra));
     const bool skipEnds = !paper && length >= 2;

@@ -38,6 +38,16 @@ inline constexpr std::uint16_t kHighBit = 0x8000;
 using Sigma = SmallFloat<11, 20>;
 /// Share of the surface [m^2], 2e-10 to 1 in 16 bits.
 using Area = SmallFloat<11, 32>;
+/// The same as a whole number of 2^-43 m^2, exactly: sums do not depend on their order.
+inline std::int64_t areaUnits(std::uint16_t code) {
+    return code == 0 ? 0 : std::int64_t{0x800 | (code & 0x7FF)} << (code >> 11U);
+}
+inline constexpr double kAreaUnitsPerSquareMetre = 8796093022208.0;  // 2^43
+
+/// Nearest whole number of an image coordinate above -4096 (halves and the last 2^-11 go up).
+inline int roundPixel(float x) {
+    return static_cast<int>(x + 4096.5F) - 4096;
+}
 
 inline float weightOf(std::uint16_t code) {
     return Weight::decode(static_cast<std::uint16_t>(code & ~kHighBit));
@@ -63,7 +73,7 @@ inline std::uint32_t encodeDirection(const Eigen::Vector3f& n) {
     }
     // 1..65535, so that a direction is never the code 0.
     const auto quantise = [](float x) {
-        return static_cast<std::uint32_t>(std::lround((x + 1.0F) * 32767.0F)) + 1U;
+        return static_cast<std::uint32_t>((x + 1.0F) * 32767.0F + 1.5F);
     };
     return quantise(u) | (quantise(v) << 16U);
 }

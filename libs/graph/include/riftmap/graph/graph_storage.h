@@ -8,6 +8,7 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <limits>
 #include <memory>
 #include <unordered_map>
@@ -51,6 +52,12 @@ struct Page {
     std::array<float, 3> min{}, max{};  ///< bounds of its living vertices [m]
 
     Eigen::Vector3f position(std::uint32_t slot) const { return {x[slot], y[slot], z[slot]}; }
+    /// False if no edge of the vertex is high; true if one may be. Free slots have weight 0.
+    bool mayHaveHighEdge(std::uint32_t slot) const {
+        std::uint64_t codes = 0;
+        std::memcpy(&codes, weight[slot].data(), sizeof(codes));
+        return (codes & 0x8000800080008000ULL) != 0 || (state[slot] & kOverflow) != 0;
+    }
     bool living(std::uint32_t slot) const { return ((alive >> slot) & 1U) != 0; }
     /// Bounds from scratch.
     void updateBounds();
@@ -177,7 +184,8 @@ class GraphStorage {
             forEachBit(page(p).alive, [&](std::uint32_t slot) { f(idOf(p, slot)); });
         }
     }
-    /// Calls f(block index) for each block whose bounds meet the box, ascending in index.
+    /// Calls f(block index) for each block whose bounds meet the box, in a fixed order: through the
+    /// hash for a small box, over all blocks for a large one.
     template <class F>
     void forEachBlockIn(const Eigen::Vector3f& min, const Eigen::Vector3f& max, F&& f) const;
 
@@ -224,15 +232,36 @@ class GraphStorage {
     std::unordered_map<std::array<std::int32_t, 3>, std::uint32_t, KeyHash> blockOfKey_;
     std::vector<EdgeChunk> edgeChunks_;
     std::uint32_t freeEdgeChunk_ = EdgeChunk::kNone;
+    double overhang_ = 0;  ///< how far vertices lie outside of their block's cube, at most [m]
     std::size_t vertexCount_ = 0, edgeCount_ = 0;
 };
 
 template <class F>
 void GraphStorage::forEachBlockIn(const Eigen::Vector3f& min, const Eigen::Vector3f& max,
                                   F&& f) const {
-    for (std::uint32_t b = 0; b < blocks_.size(); ++b) {
+    const auto visit = [&](std::uint32_t b) {
         if (blocks_[b].vertices > 0 && overlap(blocks_[b].min, blocks_[b].max, min, max)) {
             f(b);
+        }
+    };
+    const Eigen::Vector3f reach = Eigen::Vector3f::Constant(static_cast<float>(overhang_));
+    const auto low = keyOf(min - reach), high = keyOf(max + reach);
+    constexpr double kFewKeys = 64;
+    const double keys =
+        (1.0 + high[0] - low[0]) * (1.0 + high[1] - low[1]) * (1.0 + high[2] - low[2]);
+    if (!(keys <= kFewKeys) || keys > static_cast<double>(blocks_.size())) {
+        for (std::uint32_t b = 0; b < blocks_.size(); ++b) {
+            visit(b);
+        }
+        return;
+    }
+    for (std::int32_t x = low[0]; x <= high[0]; ++x) {
+        for (std::int32_t y = low[1]; y <= high[1]; ++y) {
+            for (std::int32_t z = low[2]; z <= high[2]; ++z) {
+                if (const std::uint32_t b = findBlock({x, y, z}); b != kNoBlock) {
+                    visit(b);
+                }
+            }
         }
     }
 }

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The inner loop of the association, in vector code.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+
+namespace riftmap {
+
+/// Standard deviations that still match.
+inline constexpr float kNoiseGate = 4.0F;
+
+/// How far from a pixel's point a vertex may lie and still be the same surface: never below what
+/// the noise and the sampling at that depth blur anyway.
+struct Gate {
+    float lateral = 0;  ///< across the ray [m]
+    float depth = 0;    ///< along the ray, for an exactly known vertex [m]
+};
+inline Gate gateOf(float gamma, float spacing, float sigma, float stretch) {
+    const float blur = 0.75F * spacing;
+    return {std::max(gamma, blur), std::max({gamma, kNoiseGate * sigma, blur * stretch})};
+}
+
+/// One row of pixels to match. `entry` arrays lie in the order of pixels: those of pixel i are
+/// [start[i], start[i + 1]); they must be readable 64 elements beyond their end.
+struct MatchRow {
+    const float *u = nullptr, *v = nullptr, *z = nullptr;  ///< of an entry: [px], [px], [m]
+    const float* noise = nullptr;                          ///< (kNoiseGate sigma)^2 [m^2]
+    const std::int32_t* candidate = nullptr;
+    const std::uint32_t* start = nullptr;  ///< of the whole image
+    int width = 0, height = 0, row = 0;
+    float footprint = 0, gamma = 0;
+    const float *depth = nullptr, *sigma = nullptr, *stretch = nullptr;  ///< of the row's pixels
+    float* distance = nullptr;      ///< result: squared, in gates
+    std::int32_t* found = nullptr;  ///< result: candidate or -1
+};
+
+/// For each pixel with depth > 0 the candidate within its gate with the least
+///     (lateral / gate)^2 + (along the ray / gate)^2,
+/// the smallest candidate among equals. The same on every machine.
+void matchRow(const MatchRow& row);
+
+}  // namespace riftmap
