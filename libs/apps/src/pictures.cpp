@@ -122,9 +122,26 @@ cv::Scalar bgr(const Vertex& v) {
 }
 
 /// A vertex as a point, and with each two of its neighbours across low edges as a triangle: the
-/// surface looks closed where it is.
+/// surface looks closed where it is. Each pixel quad is drawn from its first and its last corner.
 void drawSurface(Painter& painter, const PixelGraph& graph, const std::vector<VertexId>& red) {
-    std::vector<Eigen::Vector3d> neighbours;
+    struct Neighbour {
+        Eigen::Vector3d position;
+        float weight;
+    };
+    std::vector<Neighbour> before;
+    std::vector<Neighbour> after;
+    const auto drawFan = [&](const Eigen::Vector3d& at, const std::vector<Neighbour>& fan,
+                             const cv::Scalar& colour) {
+        for (std::size_t i = 0; i < fan.size(); ++i) {
+            for (std::size_t k = i + 1; k < fan.size(); ++k) {
+                const auto [shorter, longer] = std::minmax(fan[i].weight, fan[k].weight);
+                constexpr float kSlant = 14;  // more is noise along the line of sight
+                if (longer < kSlant * shorter) {
+                    painter.triangle(at, fan[i].position, fan[k].position, colour);
+                }
+            }
+        }
+    };
     graph.forEachVertex([&](VertexId id) {
         const Vertex v = graph.vertex(id);
         const Eigen::Vector3d at = v.position.cast<double>();
@@ -132,21 +149,19 @@ void drawSurface(Painter& painter, const PixelGraph& graph, const std::vector<Ve
         const cv::Scalar colour = marked ? kRed : bgr(v);
         const double pixel = painter.metresPerPixel(at);
         painter.point(at, marked ? 2 * pixel : 0, colour);
-        neighbours.clear();
+        before.clear();
+        after.clear();
         float longest = 0;
         graph.forEachEdge(id, [&](VertexId other, float weight, bool high) {
             if (!high) {
-                neighbours.push_back(graph.position(other).cast<double>());
+                auto& fan = other < id ? before : after;
+                fan.push_back({graph.position(other).cast<double>(), weight});
                 longest = std::max(longest, weight);
             }
         });
-        if (static_cast<double>(longest) < 0.5 * pixel) {
-            return;  // the points alone cover it
-        }
-        for (std::size_t i = 0; i < neighbours.size(); ++i) {
-            for (std::size_t k = i + 1; k < neighbours.size(); ++k) {
-                painter.triangle(at, neighbours[i], neighbours[k], colour);
-            }
+        if (static_cast<double>(longest) > 0.5 * pixel) {  // else the points alone cover it
+            drawFan(at, before, colour);
+            drawFan(at, after, colour);
         }
     });
 }
