@@ -2,9 +2,11 @@
 #include "riftmap/apps/build_program.h"
 
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <exception>
 #include <future>
+#include <limits>
 #include <memory>
 #include <utility>
 
@@ -256,17 +258,25 @@ class BuildProgram::Run {
 
 namespace {
 
+/// As Table I of the paper. One column where there is one view.
 void printTable(const BuildProgram::Figures& first, const BuildProgram::Figures& end) {
-    std::printf("\n%-22s %14s %14s\n", "", "first view",
-                (std::to_string(end.views) + " views").c_str());
-    const auto row = [](const char* name, std::size_t a, std::size_t b) {
-        std::printf("%-22s %14zu %14zu\n", name, a, b);
+    const bool both = end.views > 1;
+    const auto row = [both](const char* name, const std::string& a, const std::string& b) {
+        std::printf("%-20s %14s %14s\n", name, a.c_str(), both ? b.c_str() : "");
     };
-    row("Raw points", first.rawPoints, end.rawPoints);
-    row("Graph vertices", first.vertices, end.vertices);
-    row("Graph edges", first.edges, end.edges);
-    std::printf("%-22s %14.2f %14.2f\n", "Surface area [m^2]", first.surfaceArea, end.surfaceArea);
-    row("Rifts", first.rifts, end.rifts);
+    const auto count = [&row](const char* name, std::size_t a, std::size_t b) {
+        row(name, std::to_string(a), std::to_string(b));
+    };
+    const auto area = [](double squareMetres) {
+        return Field(std::round(squareMetres * 100) / 100).text() + " m^2";
+    };
+    std::printf("\n");
+    row("", "first view", std::to_string(end.views) + " views");
+    count("Raw points", first.rawPoints, end.rawPoints);
+    count("Graph vertices", first.vertices, end.vertices);
+    count("Graph edges", first.edges, end.edges);
+    row("Surface area", area(first.surfaceArea), area(end.surfaceArea));
+    count("Rifts", first.rifts, end.rifts);
 }
 
 void printPlan(const PaperPlan& plan) {
