@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <limits>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "match_kernel.cpp"
@@ -24,51 +25,86 @@ constexpr U16 kWorst = 65535;
 
 /// Scratch of one strip, cut from one block.
 struct Strip {
-    explicit Strip(const MatchJob& job, U16* scratch)
+    Strip(const MatchJob& job, U16* scratch)
         : depth(static_cast<std::size_t>(job.paddedDisparities)),
+          stride(depth + kLanes),
           width(static_cast<std::size_t>(job.width)),
           pad(static_cast<std::size_t>(job.halfWindow)),
           offset(static_cast<std::size_t>(job.supportOffset)),
           ringRows(2 * job.supportOffset + 1) {
         columns = scratch;
         ring = columns + (width + 2 * pad) * depth;
-        cost = ring + static_cast<std::size_t>(ringRows) * ringStride();
-        path = cost + width * depth;
-        rightBest = path + width * depth;
-        rightIndex = rightBest + width + depth;
-        best = rightIndex + width + depth;
+        cost = ring + static_cast<std::size_t>(ringRows) * ringStride() + kLanes;
+        pathRight = cost + width * stride + kLanes;
+        pathLeft = pathRight + width * stride + kLanes;
+        rightBest = pathLeft + width * stride;
+        rightIndex = rightBest + width + stride;
+        best = rightIndex + width + stride;
     }
     std::size_t ringStride() const { return (width + 2 * offset) * depth; }
     /// Window sums of this row, column 0.
     U16* windowRow(int row) const {
         return ring + static_cast<std::size_t>(row % ringRows) * ringStride() + offset * depth;
     }
+    std::size_t resultStride() const { return width + kLanes; }
 
-    std::size_t depth, width, pad, offset;
+    std::size_t depth;   ///< padded disparities
+    std::size_t stride;  ///< of a pixel's costs: the padding beyond `depth` holds kWorst
+    std::size_t width, pad, offset;
     int ringRows;
-    U16* columns;    ///< [column + pad][d]: sums over the height of the window
+    U16* columns;    ///< [column + pad][depth]: sums over the height of the small window
     U16* ring;       ///< the last rows of window sums
-    U16* cost;       ///< [column][d] of the row searched
-    U16* path;       ///< [column][d]: the semi-global pass from the left
+    U16* cost;       ///< [column][stride] of the row searched; kWorst before and behind
+    U16* pathRight;  ///< likewise: the semi-global pass that goes right
+    U16* pathLeft;   ///< likewise: the one that goes left
     U16* rightBest;  ///< by position in the reversed right row
     U16* rightIndex;
-    U16* best;  ///< start of the row results
+    U16* best;  ///< start of the row's minima, see Minima
 };
 
-HWY_INLINE V16 difference(D8 d8, hn::Vec<D8> a, hn::Vec<D8> b, hn::Vec<D8> limit) {
-    const auto ad = hn::Or(hn::SaturatedSub(a, b), hn::SaturatedSub(b, a));
-    (void)d8;
-    return hn::PromoteTo(D16(), hn::Min(ad, limit));
+/// What the search found for each pixel of a row.
+struct Minima {
+    explicit Minima(const Strip& s)
+        : best(s.best),
+          index(best + s.resultStride()),
+          ambiguous(index + s.resultStride()),
+          before(ambiguous + s.resultStride()),
+          after(before + s.resultStride()),
+          partner(after + s.resultStride()) {}
+    U16* best;       ///< least cost
+    U16* index;      ///< where, the lowest of equals
+    U16* ambiguous;  ///< 1: another minimum is nearly as good
+    U16* before;     ///< cost at index - 1
+    U16* after;      ///< cost at index + 1
+    U16* partner;    ///< the best index of the pixel's partner in the right image
+};
+
+/// Smallest lane. Halved down to one block, for which x86 has an instruction.
+template <class D>
+HWY_INLINE U16 smallest(D d, hn::Vec<D> v) {
+#if HWY_TARGET != HWY_SCALAR
+    if constexpr (hn::MaxLanes(D()) > 8) {
+        const hn::Half<D> half;
+        return smallest(half, hn::Min(hn::LowerHalf(half, v), hn::UpperHalf(half, v)));
+    }
+#endif
+    return hn::GetLane(hn::MinOfLanes(d, v));
+}
+
+HWY_INLINE hn::Vec<D8> difference(hn::Vec<D8> a, hn::Vec<D8> b, hn::Vec<D8> limit) {
+    return hn::Min(hn::Or(hn::SaturatedSub(a, b), hn::SaturatedSub(b, a)), limit);
 }
 
 int clampRow(const MatchJob& job, int row) {
     return std::clamp(row, 0, job.height - 1);
 }
 
-/// columns += |L - R| of row `in`, -= that of row `out` (out < -1: nothing to subtract).
-void slideDown(const MatchJob& job, const Strip& s, int in, int out, bool subtract) {
+/// columns += |L - R| of row `in`, and -= that of row `out` where there is one to leave.
+void slideDown(const MatchJob& job, const Strip& s, int in, int out, bool leave) {
     const D16 d16;
     const D8 d8;
+    const hn::RebindToSigned<D16> i16;
+    const hn::RebindToSigned<D8> i8;
     const std::size_t n = hn::Lanes(d16);
     const auto limit = hn::Set(d8, static_cast<U8>(job.truncation));
     const auto rowOf = [&](int r) { return static_cast<std::size_t>(clampRow(job, r)); };
@@ -82,12 +118,13 @@ void slideDown(const MatchJob& job, const Strip& s, int in, int out, bool subtra
         const auto lIn = hn::Set(d8, leftIn[x]);
         const auto lOut = hn::Set(d8, leftOut[x]);
         for (std::size_t d = 0; d < s.depth; d += n) {
-            auto v = hn::Load(d16, sum + d);
-            v = hn::Add(v, difference(d8, lIn, hn::LoadU(d8, rightIn + start + d), limit));
-            if (subtract) {
-                v = hn::Sub(v, difference(d8, lOut, hn::LoadU(d8, rightOut + start + d), limit));
+            auto change = difference(lIn, hn::LoadU(d8, rightIn + start + d), limit);
+            if (leave) {  // differences are at most 127: the change fits a signed byte
+                change =
+                    hn::Sub(change, difference(lOut, hn::LoadU(d8, rightOut + start + d), limit));
             }
-            hn::Store(v, d16, sum + d);
+            const auto wide = hn::PromoteTo(i16, hn::BitCast(i8, change));
+            hn::Store(hn::Add(hn::Load(d16, sum + d), hn::BitCast(d16, wide)), d16, sum + d);
         }
     }
 }
@@ -120,72 +157,137 @@ void slideAlong(const Strip& s, U16* windowRow) {
     replicateEnds(windowRow, s.width, s.depth, s.offset);
 }
 
-/// Centre window plus the better two of the four supporting windows.
-void combineWindows(const MatchJob& job, const Strip& s, int row) {
+/// Cost of columns [from, to): the centre window plus the better two of the four supporting ones.
+void combineWindows(const MatchJob& job, const Strip& s, int row, std::size_t from,
+                    std::size_t to) {
     const D16 d16;
     const std::size_t n = hn::Lanes(d16);
-    const U16* centre = s.windowRow(row);
-    if (s.offset == 0) {
-        std::memcpy(s.cost, centre, s.width * s.depth * sizeof(U16));
-        return;
-    }
+    const auto used = static_cast<std::size_t>(job.numDisparities);
     const std::size_t shift = s.offset * s.depth;
+    const U16* centre = s.windowRow(row);
     const U16* above = s.windowRow(clampRow(job, row - job.supportOffset));
     const U16* below = s.windowRow(clampRow(job, row + job.supportOffset));
-    for (std::size_t i = 0; i < s.width * s.depth; i += n) {
-        const auto a = hn::Load(d16, above + i - shift);
-        const auto b = hn::Load(d16, above + i + shift);
-        const auto c = hn::Load(d16, below + i - shift);
-        const auto e = hn::Load(d16, below + i + shift);
-        const auto mixed = hn::Add(hn::Min(a, b), hn::Min(c, e));
-        const auto two = hn::Min(mixed, hn::Min(hn::Add(a, b), hn::Add(c, e)));
-        hn::Store(hn::Add(hn::Load(d16, centre + i), two), d16, s.cost + i);
-    }
-}
-
-/// Disparities past the range never win.
-void closePadding(const MatchJob& job, const Strip& s) {
-    const auto used = static_cast<std::size_t>(job.numDisparities);
-    if (used == s.depth) {
-        return;
-    }
-    for (std::size_t x = 0; x < s.width; ++x) {
-        std::fill(s.cost + x * s.depth + used, s.cost + (x + 1) * s.depth, kWorst);
-    }
-}
-
-/// The best match of each pixel of the right row, over all left pixels.
-void searchRight(const Strip& s) {
-    const D16 d16;
-    const std::size_t n = hn::Lanes(d16);
-    std::fill(s.rightBest, s.rightBest + s.width + s.depth, kWorst);
-    std::fill(s.rightIndex, s.rightIndex + s.width + s.depth, kWorst);
-    for (std::size_t x = 0; x < s.width; ++x) {
-        const U16* cost = s.cost + x * s.depth;
-        const std::size_t start = s.width - 1 - x;
+    for (std::size_t x = from; x < to; ++x) {
+        U16* out = s.cost + x * s.stride;
         for (std::size_t d = 0; d < s.depth; d += n) {
-            const auto c = hn::Load(d16, cost + d);
-            const auto best = hn::LoadU(d16, s.rightBest + start + d);
-            const auto index = hn::LoadU(d16, s.rightIndex + start + d);
-            const auto better = hn::Lt(c, best);
-            hn::StoreU(hn::Min(c, best), d16, s.rightBest + start + d);
-            hn::StoreU(hn::IfThenElse(better, hn::Iota(d16, static_cast<U16>(d)), index), d16,
-                       s.rightIndex + start + d);
+            const std::size_t i = x * s.depth + d;
+            auto cost = hn::Load(d16, centre + i);
+            if (shift != 0) {
+                const auto a = hn::Load(d16, above + i - shift);
+                const auto b = hn::Load(d16, above + i + shift);
+                const auto c = hn::Load(d16, below + i - shift);
+                const auto e = hn::Load(d16, below + i + shift);
+                const auto mixed = hn::Add(hn::Min(a, b), hn::Min(c, e));
+                cost = hn::Add(cost, hn::Min(mixed, hn::Min(hn::Add(a, b), hn::Add(c, e))));
+            }
+            hn::Store(cost, d16, out + d);
         }
+        std::fill(out + used, out + s.depth, kWorst);
     }
 }
 
-/// The best match of each pixel of the left row and the shape of its minimum.
-void searchLeft(const Strip& s, const RowResult& out) {
+/// One pixel of a semi-global path: cost + the cheapest way on from the pixel before. Returns the
+/// path's least cost.
+HWY_INLINE U16 continuePath(const MatchJob& job, const Strip& s, const U16* cost, const U16* before,
+                            U16 leastBefore, U16* path) {
     const D16 d16;
     const std::size_t n = hn::Lanes(d16);
-    for (std::size_t x = 0; x < s.width; ++x) {
-        const U16* cost = s.cost + x * s.depth;
-        auto least = hn::Load(d16, cost);
-        for (std::size_t d = n; d < s.depth; d += n) {
-            least = hn::Min(least, hn::Load(d16, cost + d));
+    const auto small = hn::Set(d16, static_cast<U16>(job.penaltySmall));
+    const auto base = hn::Set(d16, leastBefore);
+    const auto jump = hn::SaturatedAdd(base, hn::Set(d16, static_cast<U16>(job.penaltyLarge)));
+    auto least = hn::Set(d16, kWorst);
+    for (std::size_t d = 0; d < s.depth; d += n) {
+        const auto beside = hn::Min(hn::LoadU(d16, before + d - 1), hn::LoadU(d16, before + d + 1));
+        const auto step = hn::Min(hn::Load(d16, before + d), hn::SaturatedAdd(beside, small));
+        const auto way = hn::Sub(hn::Min(step, jump), base);
+        const auto sum = hn::SaturatedAdd(hn::Load(d16, cost + d), way);
+        hn::Store(sum, d16, path + d);
+        least = hn::Min(least, sum);
+    }
+    return smallest(d16, least);
+}
+
+/// Semi-global pass along the row, both ways at once (two chains hide each other's latency).
+/// cost := sum of both paths.
+void smoothAlong(const MatchJob& job, const Strip& s) {
+    const D16 d16;
+    const std::size_t n = hn::Lanes(d16);
+    const std::size_t last = s.width - 1;
+    const auto column = [&](U16* row, std::size_t x) { return row + x * s.stride; };
+    std::memcpy(column(s.pathRight, 0), column(s.cost, 0), s.depth * sizeof(U16));
+    std::memcpy(column(s.pathLeft, last), column(s.cost, last), s.depth * sizeof(U16));
+    const auto leastOf = [&](const U16* c) { return *std::min_element(c, c + s.depth); };
+    U16 leastRight = leastOf(column(s.cost, 0));
+    U16 leastLeft = leastOf(column(s.cost, last));
+    for (std::size_t x = 1; x < s.width; ++x) {
+        const std::size_t y = last - x;
+        leastRight = continuePath(job, s, column(s.cost, x), column(s.pathRight, x - 1), leastRight,
+                                  column(s.pathRight, x));
+        leastLeft = continuePath(job, s, column(s.cost, y), column(s.pathLeft, y + 1), leastLeft,
+                                 column(s.pathLeft, y));
+    }
+    for (std::size_t i = 0; i < s.width * s.stride; i += n) {
+        hn::Store(hn::SaturatedAdd(hn::Load(d16, s.pathRight + i), hn::Load(d16, s.pathLeft + i)),
+                  d16, s.cost + i);
+    }
+}
+
+/// Lets `kGroup` neighbouring left pixels bid for the right pixels they see. Their ranges overlap;
+/// together they touch each right pixel's record once.
+template <std::size_t kGroup>
+HWY_INLINE void bid(const Strip& s, std::size_t x) {
+    const D16 d16;
+    const std::size_t n = hn::Lanes(d16);
+    const std::size_t start = s.width - 1 - (x + kGroup - 1);
+    const std::size_t reach = kGroup > 1 ? s.depth + std::max(n, kGroup) : s.depth;
+    for (std::size_t i = 0; i < reach; i += n) {
+        auto best = hn::LoadU(d16, s.rightBest + start + i);
+        auto index = hn::LoadU(d16, s.rightIndex + start + i);
+        const auto iota = hn::Iota(d16, static_cast<U16>(i));
+        for (std::size_t j = kGroup; j-- > 0;) {  // rising disparity: the lowest of equals stays
+            const auto cost = hn::LoadU(d16, s.cost + (x + kGroup - 1 - j) * s.stride + i - j);
+            index = hn::IfThenElse(hn::Lt(cost, best),
+                                   hn::Sub(iota, hn::Set(d16, static_cast<U16>(j))), index);
+            best = hn::Min(cost, best);
         }
-        least = hn::MinOfLanes(d16, least);
+        hn::StoreU(best, d16, s.rightBest + start + i);
+        hn::StoreU(index, d16, s.rightIndex + start + i);
+    }
+}
+
+/// The best match of each pixel of the right row among left pixels [from, to).
+void searchRight(const Strip& s, std::size_t from, std::size_t to) {
+    constexpr std::size_t kGroup = 8;
+    std::size_t x = from;
+    for (; x + kGroup <= to; x += kGroup) {
+        bid<kGroup>(s, x);
+    }
+    for (; x < to; ++x) {
+        bid<1>(s, x);
+    }
+}
+
+/// Rival costs below this make a match ambiguous.
+HWY_INLINE U16 rivalLimit(const MatchJob& job, U16 best) {
+    const std::uint32_t limit = best +
+                                (best * static_cast<std::uint32_t>(job.uniquenessRatio) >> 16U) +
+                                static_cast<std::uint32_t>(job.uniquenessMargin) + 1;
+    return static_cast<U16>(std::min<std::uint32_t>(kWorst, limit));
+}
+
+/// The best match of each left pixel in [from, to).
+void searchLeft(const MatchJob& job, const Strip& s, const Minima& out, std::size_t from,
+                std::size_t to) {
+    const D16 d16;
+    const std::size_t n = hn::Lanes(d16);
+    for (std::size_t x = from; x < to; ++x) {
+        const U16* cost = s.cost + x * s.stride;
+        auto lanes = hn::Load(d16, cost);
+        for (std::size_t d = n; d < s.depth; d += n) {
+            lanes = hn::Min(lanes, hn::Load(d16, cost + d));
+        }
+        const U16 best = smallest(d16, lanes);
+        const auto least = hn::Set(d16, best);
         std::size_t index = 0;
         for (std::size_t d = 0; d < s.depth; d += n) {
             const auto found = hn::FindFirstTrue(d16, hn::Eq(hn::Load(d16, cost + d), least));
@@ -194,51 +296,115 @@ void searchLeft(const Strip& s, const RowResult& out) {
                 break;
             }
         }
-        // Distance + 1 <= 2 in wrapping arithmetic: the minimum and its neighbours.
-        const auto from = hn::Set(d16, static_cast<U16>(index - 1));
-        auto second = hn::Set(d16, kWorst);
-        for (std::size_t d = 0; d < s.depth; d += n) {
-            const auto away = hn::Sub(hn::Iota(d16, static_cast<U16>(d)), from);
-            const auto c = hn::Load(d16, cost + d);
-            second = hn::Min(second, hn::IfThenElse(hn::Gt(away, hn::Set(d16, U16{2})), c,
-                                                    hn::Set(d16, kWorst)));
+        bool ambiguous = false;
+        if (job.uniquenessMargin >= 0) {
+            // Lane minus (index - 1) wraps round: more than 2 means no neighbour of the minimum.
+            const auto from1 = hn::Set(d16, static_cast<U16>(index - 1));
+            const auto two = hn::Set(d16, U16{2});
+            const auto limit = hn::Set(d16, rivalLimit(job, best));
+            for (std::size_t d = 0; d < s.depth; d += n) {
+                const auto away = hn::Sub(hn::Iota(d16, static_cast<U16>(d)), from1);
+                const auto rival =
+                    hn::And(hn::Gt(away, two), hn::Lt(hn::Load(d16, cost + d), limit));
+                ambiguous = ambiguous || !hn::AllFalse(d16, rival);
+            }
         }
-        out.best[x] = hn::GetLane(least);
-        out.bestIndex[x] = static_cast<U16>(index);
-        out.second[x] = hn::GetLane(hn::MinOfLanes(d16, second));
-        out.before[x] = index > 0 ? cost[index - 1] : kWorst;
-        out.after[x] = index + 1 < s.depth ? cost[index + 1] : kWorst;
-        out.rightIndex[x] = s.rightIndex[s.width - 1 - x + index];
+        out.best[x] = best;
+        out.index[x] = static_cast<U16>(index);
+        out.ambiguous[x] = ambiguous ? 1 : 0;
+        out.before[x] = cost[static_cast<std::ptrdiff_t>(index) - 1];
+        out.after[x] = cost[index + 1];
     }
 }
 
-void matchRows(const MatchJob& job, int first, int last, U16* scratch,
-               void (*done)(void*, int, const RowResult&), void* context) {
+/// Minima of a row -> disparity and sigma.
+void finishRow(const MatchJob& job, const Strip& s, const Minima& m, int row) {
+    for (std::size_t x = 0; x < s.width; ++x) {
+        m.partner[x] = s.rightIndex[s.width - 1 - x + m.index[x]];
+    }
+    const hn::CappedTag<float, 16> df;
+    const hn::RebindToSigned<decltype(df)> di;
+    const hn::Rebind<U16, decltype(df)> du;
+    const std::size_t n = hn::Lanes(df);
+    alignas(64) float disparity[16], sigma[16];
+    const auto wide = [&](const U16* p) { return hn::PromoteTo(di, hn::LoadU(du, p)); };
+    const auto i32 = [&](int v) { return hn::Set(di, v); };
+    const auto f32 = [&](float v) { return hn::Set(df, v); };
+    const std::size_t rowStart = static_cast<std::size_t>(row) * s.width;
+    for (auto x = static_cast<std::size_t>(job.firstColumn); x < s.width; x += n) {
+        const auto best = wide(m.best + x);
+        const auto index = wide(m.index + x);
+        const auto before = wide(m.before + x);
+        const auto after = wide(m.after + x);
+        const auto curvature = hn::Sub(hn::Add(before, after), hn::Add(best, best));
+        // The true minimum may lie beyond the ends of the range.
+        auto ok = hn::And(hn::Gt(index, i32(0)), hn::Lt(index, i32(job.numDisparities - 1)));
+        ok = hn::And(ok, hn::Eq(wide(m.ambiguous + x), i32(0)));
+        ok = hn::And(ok, hn::Gt(curvature, i32(job.minCurvature - 1)));
+        if (job.leftRightCheck) {
+            const auto apart = hn::Abs(hn::Sub(wide(m.partner + x), index));
+            ok = hn::And(ok, hn::Lt(apart, i32(job.leftRightTolerance + 1)));
+        }
+        const auto where = hn::Sub(hn::Iota(di, static_cast<int>(x) - job.minDisparity), index);
+        ok = hn::And(ok, hn::And(hn::Gt(where, i32(-1)), hn::Lt(where, i32(job.width))));
+
+        const auto sharp = hn::ConvertTo(df, hn::Max(curvature, i32(1)));
+        auto d = hn::ConvertTo(df, hn::Add(index, i32(job.minDisparity)));
+        if (job.subpixel) {
+            const auto slope = hn::ConvertTo(df, hn::Sub(before, after));
+            d = hn::Add(d, hn::Div(hn::Mul(slope, f32(0.5F)), sharp));
+        }
+        const auto variance = hn::Add(
+            f32(job.sigmaFloor * job.sigmaFloor),
+            hn::Div(hn::Mul(hn::ConvertTo(df, best), f32(job.sigmaShape * job.sigmaShape)), sharp));
+        const auto valid = hn::RebindMask(df, ok);
+        hn::Store(hn::IfThenElse(valid, d, f32(std::numeric_limits<float>::infinity())), df,
+                  disparity);
+        hn::Store(hn::IfThenElse(valid, hn::Sqrt(variance), f32(0)), df, sigma);
+        const std::size_t bytes = std::min(n, s.width - x) * sizeof(float);
+        std::memcpy(job.disparity + rowStart + x, disparity, bytes);
+        std::memcpy(job.sigma + rowStart + x, sigma, bytes);
+    }
+}
+
+void searchRow(const MatchJob& job, const Strip& s, int row) {
+    const Minima minima(s);
+    std::fill(s.rightBest, s.rightBest + s.width + s.stride, kWorst);
+    std::fill(s.rightIndex, s.rightIndex + s.width + s.stride, kWorst);
+    if (job.penaltyLarge > 0) {
+        combineWindows(job, s, row, 0, s.width);
+        smoothAlong(job, s);
+        searchRight(s, 0, s.width);
+        searchLeft(job, s, minima, 0, s.width);
+    } else {
+        // A few columns at a time, so that their costs are still in the first-level cache.
+        const std::size_t step = std::max<std::size_t>(8, 8192 / s.stride / 8 * 8);
+        for (std::size_t x = 0; x < s.width; x += step) {
+            const std::size_t end = std::min(s.width, x + step);
+            combineWindows(job, s, row, x, end);
+            searchRight(s, x, end);
+            searchLeft(job, s, minima, x, end);
+        }
+    }
+    finishRow(job, s, minima, row);
+}
+
+void matchRows(const MatchJob& job, int first, int last, U16* scratch) {
     const Strip s(job, scratch);
-    const RowResult out = {s.best,
-                           s.best + s.width,
-                           s.best + 2 * s.width,
-                           s.best + 3 * s.width,
-                           s.best + 4 * s.width,
-                           s.best + 5 * s.width};
-    // Window sums of rows [next - ringRows, next) are in the ring.
-    int next = std::max(0, first - job.supportOffset);
+    std::fill(s.cost - kLanes, s.rightBest, kWorst);
     std::fill(s.columns, s.columns + (s.width + 2 * s.pad) * s.depth, U16{0});
+    int next = std::max(0, first - job.supportOffset);  // the next row of window sums
     for (int r = next - job.halfWindow; r < next + job.halfWindow; ++r) {
         slideDown(job, s, r, r, false);
     }
-    bool fresh = true;  // the first window has nothing above it to leave
+    bool fresh = true;  // the first window has no row above it to leave
     for (int row = first; row < last; ++row) {
         for (; next <= clampRow(job, row + job.supportOffset); ++next) {
             slideDown(job, s, next + job.halfWindow, next - job.halfWindow - 1, !fresh);
             fresh = false;
             slideAlong(s, s.windowRow(next));
         }
-        combineWindows(job, s, row);
-        closePadding(job, s);
-        searchRight(s);
-        searchLeft(s, out);
-        done(context, row, out);
+        searchRow(job, s, row);
     }
 }
 
@@ -325,15 +491,16 @@ HWY_EXPORT(prefilterRows);
 std::size_t scratchSize(const MatchJob& job) {
     const auto width = static_cast<std::size_t>(job.width);
     const auto depth = static_cast<std::size_t>(job.paddedDisparities);
+    const auto stride = depth + kLanes;
     const auto offset = static_cast<std::size_t>(job.supportOffset);
     const auto pad = static_cast<std::size_t>(job.halfWindow);
-    return (width + 2 * pad) * depth + (2 * offset + 1) * (width + 2 * offset) * depth +
-           2 * width * depth + 2 * (width + depth) + 6 * width;
+    const std::size_t windows =
+        (width + 2 * pad) * depth + (2 * offset + 1) * (width + 2 * offset) * depth;
+    return windows + 3 * (kLanes + width * stride) + 2 * (width + stride) + 6 * (width + kLanes);
 }
 
-void matchRows(const MatchJob& job, int first, int last, std::uint16_t* scratch,
-               void (*done)(void*, int, const RowResult&), void* context) {
-    HWY_DYNAMIC_DISPATCH(matchRows)(job, first, last, scratch, done, context);
+void matchRows(const MatchJob& job, int first, int last, std::uint16_t* scratch) {
+    HWY_DYNAMIC_DISPATCH(matchRows)(job, first, last, scratch);
 }
 
 void prefilterRows(Filter filter, int gain, int cap, const std::uint8_t* image, std::size_t stride,
@@ -345,10 +512,16 @@ void prefilterRows(Filter filter, int gain, int cap, const std::uint8_t* image, 
 
 void reverseRight(const std::uint8_t* row, int width, int minDisparity, std::size_t n,
                   std::uint8_t* out) {
+    // Position i shows column start - i: beyond the last column, in the row, before the first.
     const int start = width - 1 - minDisparity;
-    for (std::size_t i = 0; i < n; ++i) {
-        out[i] = row[std::clamp(start - static_cast<int>(i), 0, width - 1)];
+    const auto count = static_cast<int>(n);
+    const int inside = std::clamp(start - (width - 1), 0, count);
+    const int before = std::clamp(start + 1, inside, count);
+    std::fill(out, out + inside, row[width - 1]);
+    if (before > inside) {
+        std::reverse_copy(row + (start - before + 1), row + (start - inside + 1), out + inside);
     }
+    std::fill(out + before, out + count, row[0]);
 }
 
 }  // namespace riftmap::kernel

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The inner loops of PaperMatcher: plain pointers in and out, chosen at run time for the machine's
-// instruction set. Integers throughout: every instruction set gives the same bytes.
+// instruction set. Costs are integers and floats are neither contracted nor re-ordered: every
+// instruction set gives the same bytes.
 //
-// Cost volumes are kept a row at a time with the disparities of a pixel side by side, [column][d]:
+// Costs are kept a row at a time with the disparities of a pixel side by side, [column][index]:
 // the lanes of a vector are disparities, so window sums slide along the row with one addition and
-// one subtraction, and each pixel's minimum is found in a few registers.
+// one subtraction, and a pixel's minimum is found in a few registers.
 #pragma once
 
 #include <cstddef>
@@ -17,44 +18,46 @@ inline constexpr int kLanes = 32;
 
 enum class Filter { kNone, kDog, kGradient };
 
-/// One prefiltered pair and how it is matched.
+/// One prefiltered pair, how it is matched, and where the result goes.
 struct MatchJob {
-    int width, height;                  ///< [px]
-    int numDisparities;                 ///< D
-    int paddedDisparities;              ///< D rounded up to kLanes
-    const std::uint8_t* left;           ///< row-major, `width` a row
+    int width, height;      ///< [px]
+    int minDisparity;       ///< [px]
+    int numDisparities;     ///< D; index i stands for minDisparity + i
+    int paddedDisparities;  ///< D rounded up to kLanes
+    int firstColumn;        ///< columns before it are not written
+
+    const std::uint8_t* left;           ///< `width` a row
     const std::uint8_t* rightReversed;  ///< see reverseRight(); `reversedStride` a row
     std::size_t reversedStride;
-    int truncation;     ///< largest absolute difference of one pixel [grey levels]
-    int halfWindow;     ///< of the small windows that are summed [px]
-    int supportOffset;  ///< of the supporting windows [px]; 0: one window
-    int penaltySmall;   ///< of the semi-global pass along the row; both 0: no pass
-    int penaltyLarge;
 
-    int columns() const { return width; }
-    int padding() const { return halfWindow; }
+    int truncation;     ///< largest absolute difference of one pixel, <= 127 [grey levels]
+    int halfWindow;     ///< of the small windows [px]
+    int supportOffset;  ///< from the centre to the supporting windows [px]; 0: none
+    int penaltySmall;   ///< semi-global pass along the row: a step of one disparity
+    int penaltyLarge;   ///< ... any larger step; 0: no pass
+
+    bool subpixel;
+    bool leftRightCheck;
+    int leftRightTolerance;  ///< [px]
+    int uniquenessRatio;     ///< rival costs up to best * (1 + this / 65536) + uniquenessMargin ...
+    int uniquenessMargin;    ///< ... make a match ambiguous; negative margin: no check
+    int minCurvature;        ///< least second difference of the cost at the minimum
+    float sigmaFloor;        ///< sigma^2 = floor^2 + shape^2 best / curvature [px]
+    float sigmaShape;
+
+    float* disparity;  ///< [px], infinity = none; `width` a row
+    float* sigma;      ///< [px]; `width` a row
 };
 
-/// What is known of each pixel of a row after the search.
-struct RowResult {
-    std::uint16_t* best;        ///< least cost; `width` of each
-    std::uint16_t* bestIndex;   ///< its disparity index, the lowest of equals
-    std::uint16_t* second;      ///< least cost further than one from it; 65535 where none
-    std::uint16_t* before;      ///< cost at bestIndex - 1; 65535 where none
-    std::uint16_t* after;       ///< cost at bestIndex + 1; 65535 where none
-    std::uint16_t* rightIndex;  ///< best disparity index of the pixel's partner
-};
-
-/// Numbers of 16 bits that matchRows() needs as scratch.
+/// Numbers of 16 bits that matchRows() needs as scratch, aligned to 64 bytes.
 std::size_t scratchSize(const MatchJob& job);
 
-/// Rows [first, last): calls done(context, row, result) after each, in order.
-void matchRows(const MatchJob& job, int first, int last, std::uint16_t* scratch,
-               void (*done)(void* context, int row, const RowResult& result), void* context);
+/// Matches rows [first, last).
+void matchRows(const MatchJob& job, int first, int last, std::uint16_t* scratch);
 
 /// Prefilters rows [first, last) of `image` (stride in bytes) into `out` (width a row).
-/// kDog: 128 + gain (G(0.85 px) - G(2 px)), kGradient: 128 + Sobel along the row; clipped to
-/// 128 +- cap. `scratch`: 4 * (width + 16) numbers.
+/// kDog: gain (G(0.7 px) - G(2 px)), kGradient: gain Sobel along the row; clipped to +-cap and
+/// stored with 128 added. `scratch`: 2 (width + 16) numbers.
 void prefilterRows(Filter filter, int gain, int cap, const std::uint8_t* image, std::size_t stride,
                    int width, int height, int first, int last, std::uint16_t* scratch,
                    std::uint8_t* out);

@@ -6,8 +6,8 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "riftmap/stereo/disparity_filters.h"
 #include "riftmap/stereo/grey.h"
-#include "riftmap/stereo/isolated.h"
 
 namespace riftmap {
 namespace {
@@ -57,7 +57,8 @@ void computeWith(cv::StereoMatcher& matcher, const StereoOptions& options, int w
             }
         }
     }
-    removeIsolated(out, options.isolatedSize, static_cast<float>(options.isolatedDifference));
+    IsolatedFilter().apply(out, options.isolatedSize,
+                           static_cast<float>(options.isolatedDifference));
     fillSigma(grey.left, options, window, out);
 }
 

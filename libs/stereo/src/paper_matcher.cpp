@@ -14,8 +14,8 @@
 #include <vector>
 
 #include "match_kernel.h"
+#include "riftmap/stereo/disparity_filters.h"
 #include "riftmap/stereo/grey.h"
-#include "riftmap/stereo/isolated.h"
 
 namespace riftmap {
 namespace {
@@ -60,71 +60,168 @@ class AlignedBuffer {
     std::size_t size_ = 0;
 };
 
-/// Turns the minima of a row into disparities and their sigma.
-class RowFinisher {
+/// Matches a grey pair with everything that works pixel by pixel; keeps its buffers.
+class Level {
  public:
-    RowFinisher(const StereoOptions& options, const kernel::MatchJob& job, DisparityImage& out)
-        : options_(options), job_(job), out_(out) {
-        const auto side = static_cast<float>(2 * job.halfWindow + 1);
-        pixels_ = side * side * (job.supportOffset > 0 ? 3.0F : 1.0F);
+    /// `firstColumn`: the first column of `out` that is matched.
+    void match(const StereoOptions& options, const cv::Mat& left, const cv::Mat& right,
+               int firstColumn, DisparityImage& out);
+
+ private:
+    std::vector<std::uint8_t> left_, right_, reversed_;
+    std::vector<AlignedBuffer<std::uint16_t>> scratch_;  ///< one a strip
+};
+
+kernel::MatchJob jobOf(const StereoOptions& options, int width, int height) {
+    const auto [half, offset] = layoutOf(options);
+    const int range = options.numDisparities;
+    const int windows = offset > 0 ? 3 : 1;
+    const int pixels = (2 * half + 1) * (2 * half + 1) * windows;  // that a cost sums up
+    const auto ofPixels = [&](double greyLevels) {
+        return static_cast<int>(std::lround(greyLevels * pixels));
+    };
+    return {.width = width,
+            .height = height,
+            .minDisparity = options.minDisparity,
+            .numDisparities = range,
+            .paddedDisparities = (range + kernel::kLanes - 1) / kernel::kLanes * kernel::kLanes,
+            .firstColumn = 0,
+            .left = nullptr,
+            .rightReversed = nullptr,
+            .reversedStride = 0,
+            .truncation = options.truncation,
+            .halfWindow = half,
+            .supportOffset = offset,
+            .penaltySmall = options.semiGlobal ? ofPixels(options.penaltySmall) : 0,
+            .penaltyLarge = options.semiGlobal ? std::max(1, ofPixels(options.penaltyLarge)) : 0,
+            .subpixel = options.subpixel,
+            .leftRightCheck = options.leftRightCheck,
+            .leftRightTolerance = options.leftRightTolerance,
+            .uniquenessRatio = options.uniqueness * 65536 / 100,
+            .uniquenessMargin = options.uniqueness > 0 ? ofPixels(options.uniquenessMargin) : -1,
+            .minCurvature = ofPixels(options.sharpness),
+            .sigmaFloor = static_cast<float>(options.sigmaFloor),
+            .sigmaShape = static_cast<float>(options.sigmaShape),
+            .disparity = nullptr,
+            .sigma = nullptr};
+}
+
+void Level::match(const StereoOptions& options, const cv::Mat& left, const cv::Mat& right,
+                  int firstColumn, DisparityImage& out) {
+    const int width = left.cols;
+    const int height = left.rows;
+    kernel::MatchJob job = jobOf(options, width, height);
+    const auto w = static_cast<std::size_t>(width);
+    const auto h = static_cast<std::size_t>(height);
+    const std::size_t stride = w + static_cast<std::size_t>(job.paddedDisparities);
+    left_.resize(w * h);
+    right_.resize(w * h);
+    reversed_.resize(stride * h);
+    out.resize(width, height);
+    job.firstColumn = firstColumn;
+    job.left = left_.data();
+    job.rightReversed = reversed_.data();
+    job.reversedStride = stride;
+    job.disparity = out.disparity.data();
+    job.sigma = out.sigma.data();
+
+    // Strips only share out the work: each row comes out the same whatever strip it is in.
+    const int strips = std::clamp(tbb::this_task_arena::max_concurrency(), 1, height);
+    scratch_.resize(std::max(scratch_.size(), static_cast<std::size_t>(strips)));
+    const std::size_t scratchSize = std::max(kernel::scratchSize(job), 2 * (w + 16));
+    const auto inStrips = [&](auto&& work) {
+        tbb::parallel_for(0, strips, [&](int i) {
+            work(i * height / strips, (i + 1) * height / strips,
+                 scratch_[static_cast<std::size_t>(i)].get(scratchSize));
+        });
+    };
+    inStrips([&](int first, int last, std::uint16_t* scratch) {
+        const auto filter = [&](const cv::Mat& image, std::uint8_t* to) {
+            kernel::prefilterRows(filterOf(options.prefilter), options.prefilterGain,
+                                  options.prefilterCap, image.data, image.step[0], width, height,
+                                  first, last, scratch, to);
+        };
+        filter(left, left_.data());
+        filter(right, right_.data());
+        for (auto r = static_cast<std::size_t>(first); r < static_cast<std::size_t>(last); ++r) {
+            kernel::reverseRight(right_.data() + r * w, width, options.minDisparity, stride,
+                                 reversed_.data() + r * stride);
+        }
+    });
+    inStrips([&](int first, int last, std::uint16_t* scratch) {
+        kernel::matchRows(job, first, last, scratch);
+    });
+}
+
+constexpr int kCoarse = 4;  ///< side of the blocks that are one pixel of the coarse level
+
+/// Means of whole blocks of kCoarse x kCoarse pixels.
+void shrink(const cv::Mat& image, cv::Mat& out) {
+    out.create(image.rows / kCoarse, image.cols / kCoarse, CV_8UC1);
+    for (int r = 0; r < out.rows; ++r) {
+        auto* to = out.ptr<std::uint8_t>(r);
+        for (int c = 0; c < out.cols; ++c) {
+            int sum = kCoarse * kCoarse / 2;
+            for (int i = 0; i < kCoarse; ++i) {
+                const auto* from = image.ptr<std::uint8_t>(kCoarse * r + i) + kCoarse * c;
+                for (int j = 0; j < kCoarse; ++j) {
+                    sum += from[j];
+                }
+            }
+            to[c] = static_cast<std::uint8_t>(sum / (kCoarse * kCoarse));
+        }
+    }
+}
+
+/// A matcher that only searches its range finds something there for every surface, also for one
+/// that is nearer. This searches a longer range, coarsely, and discards matches where the better
+/// explanation lies beyond.
+class NearGuard {
+ public:
+    void apply(const StereoOptions& options, const GreyPair& pair, DisparityImage& image) {
+        StereoOptions coarse = options;
+        const int end = options.minDisparity + options.numDisparities + options.guard;
+        coarse.minDisparity = static_cast<int>(std::floor(options.minDisparity / double{kCoarse}));
+        coarse.numDisparities = (end + kCoarse - 1) / kCoarse - coarse.minDisparity;
+        coarse.window = std::min(options.window, 7);
+        coarse.semiGlobal = false;
+        coarse.subpixel = false;
+        if (options.guard <= 0 || image.width < 2 * kCoarse || image.height < 2 * kCoarse) {
+            return;
+        }
+        shrink(pair.left, left_);
+        shrink(pair.right, right_);
+        level_.match(coarse, left_, right_, 0, found_);
+        discard(image);
     }
 
-    void operator()(int row, const kernel::RowResult& r) const {
-        for (int c = out_.firstColumn; c < out_.width; ++c) {
-            const auto x = static_cast<std::size_t>(c);
-            if (accepted(r, x)) {
-                write(out_.index(c, row), r, x);
+ private:
+    void discard(DisparityImage& image) const {
+        const float beyond = image.maxDisparity + kCoarse / 2;
+        for (int r = 0; r < found_.height * kCoarse; ++r) {
+            for (int c = 0; c < found_.width; ++c) {
+                const float d = found_.at(c, r / kCoarse) * kCoarse;
+                if (d > beyond && std::isfinite(d)) {
+                    auto* first = image.disparity.data() + image.index(c * kCoarse, r);
+                    std::fill(first, first + kCoarse, kNoDisparity);
+                }
             }
         }
     }
 
- private:
-    bool accepted(const kernel::RowResult& r, std::size_t x) const {
-        const int index = r.bestIndex[x];
-        // The true minimum may lie beyond the ends of the range.
-        if (index == 0 || index >= job_.numDisparities - 1) {
-            return false;
-        }
-        const int best = r.best[x];
-        if (r.second[x] * (100 - options_.uniqueness) < best * 100) {
-            return false;
-        }
-        const int curvature = r.before[x] + r.after[x] - 2 * best;
-        if (static_cast<float>(curvature) < static_cast<float>(options_.sharpness) * pixels_) {
-            return false;
-        }
-        const int partner = static_cast<int>(x) - options_.minDisparity - index;
-        return !options_.leftRightCheck ||
-               (partner >= 0 && partner < job_.width &&
-                std::abs(r.rightIndex[x] - index) <= options_.leftRightTolerance);
-    }
-
-    void write(std::size_t i, const kernel::RowResult& r, std::size_t x) const {
-        const auto before = static_cast<float>(r.before[x]);
-        const auto after = static_cast<float>(r.after[x]);
-        const auto best = static_cast<float>(r.best[x]);
-        const float curvature = std::max(1.0F, before + after - 2 * best);
-        const float shift = options_.subpixel ? 0.5F * (before - after) / curvature : 0.0F;
-        out_.disparity[i] =
-            static_cast<float>(options_.minDisparity + static_cast<int>(r.bestIndex[x])) + shift;
-        const auto floor = static_cast<float>(options_.sigmaFloor);
-        const float spread =
-            static_cast<float>(options_.imageNoise) * std::sqrt(pixels_) / curvature;
-        out_.sigma[i] = std::sqrt(floor * floor + spread * spread);
-    }
-
-    const StereoOptions& options_;
-    const kernel::MatchJob& job_;
-    DisparityImage& out_;
-    float pixels_ = 0;  ///< in a cost
+    Level level_;
+    cv::Mat left_, right_;
+    DisparityImage found_;
 };
 
 }  // namespace
 
 struct PaperMatcher::Buffers {
     GreyPair grey;
-    std::vector<std::uint8_t> left, right, reversed;
-    std::vector<AlignedBuffer<std::uint16_t>> scratch;  ///< one a strip
+    Level level;
+    NearGuard guard;
+    IsolatedFilter isolated;
+    std::vector<float> scratch;
 };
 
 PaperMatcher::PaperMatcher(const StereoOptions& options)
@@ -140,68 +237,15 @@ PaperMatcher::~PaperMatcher() = default;
 void PaperMatcher::compute(const cv::Mat& left, const cv::Mat& right, DisparityImage& out) {
     Buffers& b = *buffers_;
     toGreyPair(left, right, b.grey);
-    const int width = b.grey.left.cols;
-    const int height = b.grey.left.rows;
-    const int range = options_.numDisparities;
-    out.resize(width, height);
+    const int maxDisparity = options_.minDisparity + options_.numDisparities - 1;
     out.minDisparity = static_cast<float>(options_.minDisparity);
-    out.maxDisparity = static_cast<float>(options_.minDisparity + range - 1);
-    out.firstColumn = std::clamp(options_.minDisparity + range - 1, 0, width);
-
-    const auto [half, offset] = layoutOf(options_);
-    const int padded = (range + kernel::kLanes - 1) / kernel::kLanes * kernel::kLanes;
-    const auto w = static_cast<std::size_t>(width);
-    const auto pixels = w * static_cast<std::size_t>(height);
-    const std::size_t reversedStride = w + static_cast<std::size_t>(padded);
-    b.left.resize(pixels);
-    b.right.resize(pixels);
-    b.reversed.resize(reversedStride * static_cast<std::size_t>(height));
-    const kernel::MatchJob job = {.width = width,
-                                  .height = height,
-                                  .numDisparities = range,
-                                  .paddedDisparities = padded,
-                                  .left = b.left.data(),
-                                  .rightReversed = b.reversed.data(),
-                                  .reversedStride = reversedStride,
-                                  .truncation = options_.truncation,
-                                  .halfWindow = half,
-                                  .supportOffset = offset,
-                                  .penaltySmall = 0,
-                                  .penaltyLarge = 0};
-
-    // Strips only share out the work: each row comes out the same whatever strip it is in.
-    const int strips = std::clamp(tbb::this_task_arena::max_concurrency(), 1, height);
-    b.scratch.resize(static_cast<std::size_t>(strips));
-    const auto firstRow = [&](int strip) { return strip * height / strips; };
-    const std::size_t scratchSize = std::max(kernel::scratchSize(job), 4 * (w + 16));
-
-    tbb::parallel_for(0, strips, [&](int strip) {
-        auto* scratch = b.scratch[static_cast<std::size_t>(strip)].get(scratchSize);
-        const int first = firstRow(strip), last = firstRow(strip + 1);
-        const auto filter = [&](const cv::Mat& image, std::vector<std::uint8_t>& to) {
-            kernel::prefilterRows(filterOf(options_.prefilter), options_.prefilterGain,
-                                  options_.prefilterCap, image.data, image.step[0], width, height,
-                                  first, last, scratch, to.data());
-        };
-        filter(b.grey.left, b.left);
-        filter(b.grey.right, b.right);
-        for (int row = first; row < last; ++row) {
-            const auto r = static_cast<std::size_t>(row);
-            kernel::reverseRight(b.right.data() + r * w, width, options_.minDisparity,
-                                 reversedStride, b.reversed.data() + r * reversedStride);
-        }
-    });
-
-    const RowFinisher finish(options_, job, out);
-    tbb::parallel_for(0, strips, [&](int strip) {
-        auto* scratch = b.scratch[static_cast<std::size_t>(strip)].get(scratchSize);
-        const auto done = [](void* context, int row, const kernel::RowResult& result) {
-            (*static_cast<const RowFinisher*>(context))(row, result);
-        };
-        kernel::matchRows(job, firstRow(strip), firstRow(strip + 1), scratch, done,
-                          const_cast<RowFinisher*>(&finish));
-    });
-    removeIsolated(out, options_.isolatedSize, static_cast<float>(options_.isolatedDifference));
+    out.maxDisparity = static_cast<float>(maxDisparity);
+    out.firstColumn = std::clamp(maxDisparity, 0, b.grey.left.cols);
+    b.level.match(options_, b.grey.left, b.grey.right, out.firstColumn, out);
+    b.guard.apply(options_, b.grey, out);
+    b.isolated.apply(out, options_.isolatedSize, static_cast<float>(options_.isolatedDifference));
+    discardSilhouettes(out, options_.silhouetteReach, static_cast<float>(options_.silhouetteStep),
+                       b.scratch);
 }
 
 }  // namespace riftmap

@@ -31,8 +31,19 @@ void StereoOptions::describe(OptionTable& table) {
     table.add("supporting_windows", supportingWindows,
               "Match with five small windows that share out the window, the centre and the better "
               "two of the corners, instead of one.");
+    table.add("semi_global", semiGlobal,
+              "Let each match agree with its neighbours along the row (semi-global matching).");
+    table.add("penalty_small", penaltySmall, 0.0, 60.0, "grey levels",
+              "Semi-global: cost of a step of 1 px, a pixel of the window.");
+    table.add("penalty_large", penaltyLarge, 0.0, 60.0, "grey levels",
+              "Semi-global: cost of a larger step, a pixel of the window.");
+    table.add("uniqueness_margin", uniquenessMargin, 0.0, 60.0, "grey levels",
+              "Added to the share of uniqueness, a pixel of the window.");
     table.add("sharpness", sharpness, 0.0, 255.0, "grey levels",
               "Least second difference of the cost at its minimum, a pixel of the window.");
+    table.add("guard", guard, 0, 1024, "px",
+              "Surfaces nearer than the range are looked for so far beyond it, at a quarter of the "
+              "resolution, so that they do not match wrongly within it; 0: off.");
     table.add("left_right_check", leftRightCheck,
               "Discard matches that the right image does not agree with.");
     table.add("left_right_tolerance", leftRightTolerance, 0, 16, "px",
@@ -44,10 +55,18 @@ void StereoOptions::describe(OptionTable& table) {
               "Groups of fewer pixels of similar disparity are discarded; 0 keeps all.");
     table.add("isolated_difference", isolatedDifference, 0.0, 16.0, "px",
               "Neighbours that differ by no more belong together.");
-    table.add("image_noise", imageNoise, 0.0, 64.0, "grey levels",
-              "Standard deviation of an image sample.");
+    table.add("silhouette_reach", silhouetteReach, 0, 10, "px",
+              "Pixels so near to a farther surface are discarded: windows make silhouettes fatter; "
+              "0 keeps all.");
+    table.add("silhouette_step", silhouetteStep, 0.5, 64.0, "px",
+              "Disparity by which a farther surface is lower, at least.");
     table.add("sigma_floor", sigmaFloor, 0.001, 10.0, "px",
               "Least standard deviation of a matched disparity.");
+    table.add(
+        "sigma_shape", sigmaShape, 0.0, 10.0, "px",
+        "Growth of the standard deviation with the root of cost over curvature at the minimum.");
+    table.add("image_noise", imageNoise, 0.0, 64.0, "grey levels",
+              "Standard deviation of an image sample, for the sigma of OpenCV's matchers.");
     table.add("sigma_d", sigmaGiven, 0.001, 10.0, "px",
               "Standard deviation of a given disparity that comes without one.");
 }

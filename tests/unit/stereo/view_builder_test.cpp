@@ -11,7 +11,7 @@
 
 #include "riftmap/core/options.h"
 #include "riftmap/stereo/grey.h"
-#include "riftmap/stereo/isolated.h"
+#include "riftmap/stereo/disparity_filters.h"
 
 namespace riftmap {
 namespace {
@@ -128,14 +128,14 @@ TEST(ViewBuilder, TakesTheDisparityThatTheObservationBrings) {
     EXPECT_THAT(messageOf([&] { builder.build(o); }), HasSubstr("given disparity is 100 x 120"));
 }
 
-TEST(RemoveIsolated, DropsSmallGroupsOnly) {
+TEST(IsolatedFilter, DropsSmallGroupsOnly) {
     DisparityImage d;
     d.resize(6, 3);
     for (const std::size_t i : {0U, 1U, 6U, 4U}) {
         d.disparity[i] = 10.0F;
     }
     d.disparity[7] = 12.0F;  // beside a group, but at another depth
-    removeIsolated(d, 3, 1.0F);
+    IsolatedFilter().apply(d, 3, 1.0F);
     EXPECT_TRUE(d.valid(0, 0) && d.valid(1, 0) && d.valid(0, 1));
     EXPECT_FALSE(d.valid(4, 0) || d.valid(1, 1));
 }

@@ -26,21 +26,32 @@ struct StereoOptions {
     int minDisparity = 0;     ///< least disparity searched [px]; may be negative
     int numDisparities = 64;  ///< how many disparities are searched, 1 px apart; > 0
     int window = 11;          ///< side of the correlation window [px], odd, 3..21
-    Prefilter prefilter = Prefilter::kGradient;
-    int prefilterGain = 1;          ///< factor on the filtered image
-    int prefilterCap = 31;          ///< filtered values are clipped to +- this [grey levels]
-    int truncation = 62;            ///< largest difference of one pixel [grey levels]
-    bool supportingWindows = true;  ///< several small windows instead of one
-    double sharpness = 0.0;         ///< least curvature of a minimum [grey levels a pixel]
+
+    Prefilter prefilter = Prefilter::kDog;
+    int prefilterGain = 4;          ///< factor on the filtered image
+    int prefilterCap = 127;         ///< filtered values are clipped to +- this [grey levels]
+    int truncation = 30;            ///< largest difference that one pixel counts with [grey levels]
+    bool supportingWindows = true;  ///< five small windows that share out the window
+    bool semiGlobal = false;        ///< a semi-global pass along the row over the windows' costs
+    double penaltySmall = 1.2;      ///< of a step of 1 px [grey levels a pixel of the window]
+    double penaltyLarge = 8;        ///< of any larger step [grey levels a pixel of the window]
+
+    int guard = 64;  ///< how far beyond the range nearer surfaces are looked for, coarsely [px]
     bool leftRightCheck = true;
-    int leftRightTolerance = 1;  ///< largest difference of the two directions [px]
-    int uniqueness = 5;          ///< the second best minimum is at least so much worse [%]
+    int leftRightTolerance = 2;   ///< largest difference of the two directions [px]
+    int uniqueness = 3;           ///< the second best minimum is at least so much worse [%]
+    double uniquenessMargin = 0;  ///< and by this [grey levels a pixel of the window]
+    double sharpness = 0;         ///< least curvature of a minimum [grey levels a pixel]
     bool subpixel = true;
-    int isolatedSize = 100;           ///< groups of fewer pixels are discarded; 0 keeps all [px]
-    double isolatedDifference = 1.0;  ///< neighbours nearer than this belong together [px]
-    double imageNoise = 2.0;          ///< standard deviation of an image sample [grey levels]
-    double sigmaFloor = 0.1;          ///< least standard deviation of a disparity [px]
-    double sigmaGiven = 0.1;          ///< standard deviation of a given disparity [px]
+    int isolatedSize = 100;         ///< groups of fewer pixels are discarded; 0 keeps all [px]
+    double isolatedDifference = 1;  ///< neighbours nearer than this belong together [px]
+    int silhouetteReach = 3;        ///< pixels so near to a farther surface are discarded [px]
+    double silhouetteStep = 4;      ///< what counts as farther: lower disparity by more [px]
+
+    double sigmaFloor = 0.16;  ///< least standard deviation of a disparity [px]
+    double sigmaShape = 0.22;  ///< its growth with cost over curvature at the minimum [px]
+    double imageNoise = 2;     ///< standard deviation of a sample, for OpenCV's [grey levels]
+    double sigmaGiven = 0.1;   ///< standard deviation of a given disparity [px]
 
     /// Adds section [Stereo] to the table.
     void describe(OptionTable& table);

@@ -1,0 +1,361 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "reference_matcher.h"
+
+#include <algorithm>
+#include <array>
+#include <climits>
+#include <cmath>
+#include <cstdlib>
+#include <functional>
+#include <utility>
+#include <vector>
+
+namespace riftmap::reference {
+namespace {
+
+constexpr long kWorst = 65535;
+
+/// An image of integers that repeats its border for ever.
+struct Image {
+    int width = 0, height = 0;
+    std::vector<int> values;
+
+    Image(int w, int h)
+        : width(w), height(h), values(static_cast<std::size_t>(w) * static_cast<std::size_t>(h)) {}
+    int& at(int x, int y) {
+        x = std::clamp(x, 0, width - 1);
+        y = std::clamp(y, 0, height - 1);
+        return values[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
+                      static_cast<std::size_t>(x)];
+    }
+    int at(int x, int y) const { return const_cast<Image*>(this)->at(x, y); }
+};
+
+Image fromMat(const cv::Mat& m) {
+    Image image(m.cols, m.rows);
+    for (int y = 0; y < m.rows; ++y) {
+        for (int x = 0; x < m.cols; ++x) {
+            image.at(x, y) = m.at<std::uint8_t>(y, x);
+        }
+    }
+    return image;
+}
+
+/// Sum over the outer product of the weights, centred at (x, y).
+long filtered(const Image& image, int x, int y, const std::vector<int>& across,
+              const std::vector<int>& down) {
+    long sum = 0;
+    for (int j = 0; j < static_cast<int>(down.size()); ++j) {
+        for (int i = 0; i < static_cast<int>(across.size()); ++i) {
+            sum += static_cast<long>(down[static_cast<std::size_t>(j)]) *
+                   across[static_cast<std::size_t>(i)] *
+                   image.at(x + i - static_cast<int>(across.size()) / 2,
+                            y + j - static_cast<int>(down.size()) / 2);
+        }
+    }
+    return sum;
+}
+
+Image prefiltered(const Image& image, const StereoOptions& o) {
+    if (o.prefilter == Prefilter::kNone) {
+        return image;
+    }
+    const std::vector<int> narrow = {1, 2, 1};
+    const std::vector<int> wide = {7, 17, 32, 46, 52, 46, 32, 17, 7};
+    Image out(image.width, image.height);
+    for (int y = 0; y < image.height; ++y) {
+        for (int x = 0; x < image.width; ++x) {
+            long v = 0;
+            if (o.prefilter == Prefilter::kGradient) {
+                v = filtered(image, x, y, {-1, 0, 1}, narrow) * o.prefilterGain;
+            } else {
+                const double dog = static_cast<double>(filtered(image, x, y, narrow, narrow)) / 16 -
+                                   static_cast<double>(filtered(image, x, y, wide, wide)) / 65536;
+                v = static_cast<long>(std::floor(dog * o.prefilterGain + 0.5));
+            }
+            out.at(x, y) =
+                128 + static_cast<int>(std::clamp<long>(v, -o.prefilterCap, o.prefilterCap));
+        }
+    }
+    return out;
+}
+
+/// One number for each pixel and disparity index; pixels beyond the border repeat it.
+struct Volume {
+    int width, height, depth;
+    std::vector<long> values;
+
+    Volume(int w, int h, int n)
+        : width(w),
+          height(h),
+          depth(n),
+          values(static_cast<std::size_t>(w) * static_cast<std::size_t>(h) *
+                 static_cast<std::size_t>(n)) {}
+    long& at(int x, int y, int i) {
+        x = std::clamp(x, 0, width - 1);
+        y = std::clamp(y, 0, height - 1);
+        return values[(static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
+                       static_cast<std::size_t>(x)) *
+                          static_cast<std::size_t>(depth) +
+                      static_cast<std::size_t>(i)];
+    }
+};
+
+void forAll(Volume& v, const std::function<long(int, int, int)>& value) {
+    for (int y = 0; y < v.height; ++y) {
+        for (int x = 0; x < v.width; ++x) {
+            for (int i = 0; i < v.depth; ++i) {
+                v.at(x, y, i) = value(x, y, i);
+            }
+        }
+    }
+}
+
+/// One path of semi-global matching along the rows; step +1: rightwards.
+Volume path(Volume& cost, int step, long small, long large) {
+    Volume out(cost.width, cost.height, cost.depth);
+    for (int y = 0; y < cost.height; ++y) {
+        for (int k = 0; k < cost.width; ++k) {
+            const int x = step > 0 ? k : cost.width - 1 - k;
+            long least = kWorst;
+            for (int i = 0; k > 0 && i < cost.depth; ++i) {
+                least = std::min(least, out.at(x - step, y, i));
+            }
+            for (int i = 0; i < cost.depth; ++i) {
+                long way = 0;
+                if (k > 0) {
+                    way = std::min(out.at(x - step, y, i), least + large);
+                    if (i > 0) {
+                        way = std::min(way, out.at(x - step, y, i - 1) + small);
+                    }
+                    if (i + 1 < cost.depth) {
+                        way = std::min(way, out.at(x - step, y, i + 1) + small);
+                    }
+                    way -= least;
+                }
+                out.at(x, y, i) = std::min(kWorst, cost.at(x, y, i) + way);
+            }
+        }
+    }
+    return out;
+}
+
+struct Layout {
+    int half, offset, pixels;
+};
+
+Layout layoutOf(const StereoOptions& o) {
+    const int offset = o.supportingWindows ? (o.window + 1) / 4 : 0;
+    const int half = (o.window - 2 * offset) / 2;
+    return {half, offset, (2 * half + 1) * (2 * half + 1) * (offset > 0 ? 3 : 1)};
+}
+
+Volume costs(const Image& left, const Image& right, const StereoOptions& o) {
+    const auto [half, offset, pixels] = layoutOf(o);
+    Volume single(left.width, left.height, o.numDisparities);
+    forAll(single, [&](int x, int y, int i) {
+        return std::min(o.truncation,
+                        std::abs(left.at(x, y) - right.at(x - o.minDisparity - i, y)));
+    });
+    Volume window = single;
+    forAll(window, [&, h = half](int x, int y, int i) {
+        long sum = 0;
+        for (int v = -h; v <= h; ++v) {
+            for (int u = -h; u <= h; ++u) {
+                sum += single.at(x + u, y + v, i);
+            }
+        }
+        return sum;
+    });
+    Volume cost = window;
+    if (offset > 0) {
+        forAll(cost, [&, f = offset](int x, int y, int i) {
+            std::array<long, 4> support = {window.at(x - f, y - f, i), window.at(x + f, y - f, i),
+                                           window.at(x - f, y + f, i), window.at(x + f, y + f, i)};
+            std::sort(support.begin(), support.end());
+            return window.at(x, y, i) + support[0] + support[1];
+        });
+    }
+    if (o.semiGlobal) {
+        const auto penalty = [&, n = pixels](double p) { return std::lround(p * n); };
+        const long large = std::max(1L, penalty(o.penaltyLarge));
+        Volume toRight = path(cost, 1, penalty(o.penaltySmall), large);
+        Volume toLeft = path(cost, -1, penalty(o.penaltySmall), large);
+        forAll(cost, [&](int x, int y, int i) {
+            return std::min(kWorst, toRight.at(x, y, i) + toLeft.at(x, y, i));
+        });
+    }
+    return cost;
+}
+
+/// Disparity index of the right pixel's best match over the whole row; -1: outside.
+int bestOfRight(Volume& cost, int column, int y, const StereoOptions& o) {
+    int best = -1;
+    long least = kWorst;
+    for (int i = 0; i < cost.depth; ++i) {
+        const int x = column + o.minDisparity + i;
+        if (x >= 0 && x < cost.width && cost.at(x, y, i) < least) {
+            least = cost.at(x, y, i);
+            best = i;
+        }
+    }
+    return best;
+}
+
+void matchPixel(Volume& cost, int x, int y, const StereoOptions& o, DisparityImage& out) {
+    int best = 0;
+    for (int i = 1; i < cost.depth; ++i) {
+        best = cost.at(x, y, i) < cost.at(x, y, best) ? i : best;
+    }
+    if (best == 0 || best == cost.depth - 1) {
+        return;
+    }
+    const int pixels = layoutOf(o).pixels;
+    const long least = cost.at(x, y, best);
+    if (o.uniqueness > 0) {
+        const long limit = least + least * (o.uniqueness * 65536 / 100) / 65536 +
+                           std::lround(o.uniquenessMargin * pixels);
+        for (int i = 0; i < cost.depth; ++i) {
+            if (std::abs(i - best) > 1 && cost.at(x, y, i) <= std::min(limit, kWorst - 1)) {
+                return;
+            }
+        }
+    }
+    const long before = cost.at(x, y, best - 1);
+    const long after = cost.at(x, y, best + 1);
+    const long curvature = before + after - 2 * least;
+    if (curvature < std::lround(o.sharpness * pixels)) {
+        return;
+    }
+    const int partner = x - o.minDisparity - best;
+    if (partner < 0 || partner >= cost.width) {
+        return;
+    }
+    if (o.leftRightCheck &&
+        std::abs(bestOfRight(cost, partner, y, o) - best) > o.leftRightTolerance) {
+        return;
+    }
+    const auto sharp = static_cast<float>(std::max(1L, curvature));
+    float d = static_cast<float>(best + o.minDisparity);
+    if (o.subpixel) {
+        d += static_cast<float>(before - after) * 0.5F / sharp;
+    }
+    const auto floor = static_cast<float>(o.sigmaFloor);
+    const auto shape = static_cast<float>(o.sigmaShape);
+    out.disparity[out.index(x, y)] = d;
+    out.sigma[out.index(x, y)] =
+        std::sqrt(floor * floor + static_cast<float>(least) * (shape * shape) / sharp);
+}
+
+DisparityImage level(const Image& left, const Image& right, const StereoOptions& o,
+                     int firstColumn) {
+    Volume cost = costs(prefiltered(left, o), prefiltered(right, o), o);
+    DisparityImage out;
+    out.resize(left.width, left.height);
+    for (int y = 0; y < left.height; ++y) {
+        for (int x = firstColumn; x < left.width; ++x) {
+            matchPixel(cost, x, y, o, out);
+        }
+    }
+    return out;
+}
+
+Image shrunk(const Image& image) {
+    Image out(image.width / 4, image.height / 4);
+    for (int y = 0; y < out.height; ++y) {
+        for (int x = 0; x < out.width; ++x) {
+            int sum = 0;
+            for (int k = 0; k < 16; ++k) {
+                sum += image.at(4 * x + k % 4, 4 * y + k / 4);
+            }
+            out.at(x, y) = (sum + 8) / 16;
+        }
+    }
+    return out;
+}
+
+void guard(const Image& left, const Image& right, const StereoOptions& o, DisparityImage& out) {
+    if (o.guard == 0 || left.width < 8 || left.height < 8) {
+        return;
+    }
+    StereoOptions coarse = o;
+    coarse.minDisparity = static_cast<int>(std::floor(o.minDisparity / 4.0));
+    const int end = o.minDisparity + o.numDisparities + o.guard;
+    coarse.numDisparities = static_cast<int>(std::ceil(end / 4.0)) - coarse.minDisparity;
+    coarse.window = std::min(7, o.window);
+    coarse.semiGlobal = false;
+    coarse.subpixel = false;
+    const DisparityImage found = level(shrunk(left), shrunk(right), coarse, 0);
+    for (int y = 0; y < found.height * 4; ++y) {
+        for (int x = 0; x < found.width * 4; ++x) {
+            if (found.valid(x / 4, y / 4) &&
+                found.at(x / 4, y / 4) * 4 >
+                    static_cast<float>(o.minDisparity + o.numDisparities + 1)) {
+                out.disparity[out.index(x, y)] = kNoDisparity;
+            }
+        }
+    }
+}
+
+void removeIsolated(DisparityImage& image, const StereoOptions& o) {
+    std::vector<char> seen(image.disparity.size(), 0);
+    for (int y = 0; y < image.height; ++y) {
+        for (int x = 0; x < image.width; ++x) {
+            if (!image.valid(x, y) || seen[image.index(x, y)] != 0) {
+                continue;
+            }
+            std::vector<std::pair<int, int>> group = {{x, y}};
+            seen[image.index(x, y)] = 1;
+            for (std::size_t k = 0; k < group.size(); ++k) {
+                const auto [u, v] = group[k];
+                const std::array<std::pair<int, int>, 4> around = {
+                    {{u - 1, v}, {u + 1, v}, {u, v - 1}, {u, v + 1}}};
+                for (const auto& [s, t] : around) {
+                    if (s >= 0 && t >= 0 && s < image.width && t < image.height &&
+                        image.valid(s, t) && seen[image.index(s, t)] == 0 &&
+                        std::abs(image.at(s, t) - image.at(u, v)) <=
+                            static_cast<float>(o.isolatedDifference)) {
+                        seen[image.index(s, t)] = 1;
+                        group.emplace_back(s, t);
+                    }
+                }
+            }
+            if (group.size() < static_cast<std::size_t>(o.isolatedSize)) {
+                for (const auto& [u, v] : group) {
+                    image.disparity[image.index(u, v)] = kNoDisparity;
+                }
+            }
+        }
+    }
+}
+
+void discardSilhouettes(DisparityImage& image, const StereoOptions& o) {
+    const DisparityImage before = image;
+    const int r = o.silhouetteReach;
+    for (int y = 0; y < image.height; ++y) {
+        for (int x = 0; x < image.width; ++x) {
+            for (int v = std::max(0, y - r); v <= std::min(image.height - 1, y + r); ++v) {
+                for (int u = std::max(0, x - r); u <= std::min(image.width - 1, x + r); ++u) {
+                    if (before.valid(x, y) && before.valid(u, v) &&
+                        before.at(x, y) - before.at(u, v) > static_cast<float>(o.silhouetteStep)) {
+                        image.disparity[image.index(x, y)] = kNoDisparity;
+                    }
+                }
+            }
+        }
+    }
+}
+
+}  // namespace
+
+DisparityImage match(const cv::Mat& left, const cv::Mat& right, const StereoOptions& o) {
+    const Image l = fromMat(left), r = fromMat(right);
+    const int last = o.minDisparity + o.numDisparities - 1;
+    DisparityImage out = level(l, r, o, std::clamp(last, 0, l.width));
+    guard(l, r, o, out);
+    removeIsolated(out, o);
+    discardSilhouettes(out, o);
+    return out;
+}
+
+}  // namespace riftmap::reference
