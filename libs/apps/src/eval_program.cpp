@@ -11,9 +11,7 @@
 #include "riftmap/core/run_directory.h"
 #include "riftmap/eval/pictures.h"
 #include "riftmap/graph/pixel_graph.h"
-#if __has_include("riftmap/maps/map_file.h")
 #include "riftmap/maps/map_file.h"
-#endif
 #include "riftmap/stereo/view_builder.h"
 
 namespace riftmap {
@@ -156,6 +154,7 @@ void EvalProgram::describe(OptionTable& table) {
     judge_.describe(table);
     input_.describe(table);
     stereo_.describe(table);
+    graph_.describe(table);
 }
 
 void EvalProgram::arguments(CommandLine& line) {
@@ -170,7 +169,7 @@ void EvalProgram::arguments(CommandLine& line) {
 
 EvalProgram::Map EvalProgram::readMap() const {
     Map out;
-    [[maybe_unused]] const auto takeGraph = [&](const PixelGraph& graph) {
+    const auto takeGraph = [&](const PixelGraph& graph) {
         out.area = graph.surfaceArea();
         out.rifts.emplace();
         for (const Rift& rift : graph.rifts()) {
@@ -179,27 +178,21 @@ EvalProgram::Map EvalProgram::readMap() const {
             }
         }
     };
-#if __has_include("riftmap/maps/map_file.h")
     if (map_.extension() == ".pixelgraph") {
         const PixelGraphMap map = loadMap(map_);
         PointCloud cloud = cloudOf(map.graph());
         out.points = std::move(cloud.points);
         out.normals = std::move(cloud.normals);
         takeGraph(map.graph());
-    } else
-#endif
-    {
+    } else {
         PointCloud cloud = readPly(map_);
         out.points = std::move(cloud.points);
         out.normals = std::move(cloud.normals);
         // Beside a graph.ply of ours lies the graph itself, with its area and its rifts.
         const fs::path graph = map_.parent_path() / "map.pixelgraph";
-#if __has_include("riftmap/maps/map_file.h")
         if (map_.filename() == "graph.ply" && fs::exists(graph)) {
             takeGraph(loadMap(graph).graph());
-        } else
-#endif
-        {
+        } else {
             out.area = yamlNumber(map_.parent_path() / "summary.yaml", "surface_area_m2");
         }
     }

@@ -10,6 +10,7 @@
 #include "riftmap/apps/rawlog_reader.h"
 #include "riftmap/eval/coverage.h"
 #include "riftmap/eval/octomap_check.h"
+#include "riftmap/graph/pixel_graph.h"
 #include "riftmap/sim/simulated_platform.h"
 #include "riftmap/sim/trajectory.h"
 #include "riftmap/stereo/stereo_options.h"
@@ -50,7 +51,9 @@ class EvalProgram : public Program {
     void print() const;
 
     SimulationOptions simulation_;
-    TrajectoryOptions trajectory_;  ///< unused: the files in config/worlds hold it
+    // Not used, but the files of riftmap-simulate and riftmap-build hold them.
+    TrajectoryOptions trajectory_;
+    GraphOptions graph_;
     EvalOptions eval_;
     JudgeOptions judge_;
     RawlogOptions input_;
