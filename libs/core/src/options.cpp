@@ -197,7 +197,9 @@ void OptionTable::addNamed(const std::string& key, const std::vector<std::string
         allowed += (allowed.empty() ? "" : " | ") + name;
     }
     const auto parse = [names, setIndex](const std::string& s) {
-        const auto it = std::find(names.begin(), names.end(), lower(trimmed(s)));
+        const auto it = std::find_if(
+            names.begin(), names.end(),
+            [given = lower(trimmed(s))](const std::string& name) { return lower(name) == given; });
         if (it == names.end()) {
             throw ConfigError("unknown choice");
         }

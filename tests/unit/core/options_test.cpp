@@ -53,6 +53,18 @@ std::string errorOf(const std::string& content) {
     return {};
 }
 
+TEST(Options, ChoicesAreFoundInAnyCase) {
+    int level = 0;
+    OptionTable table;
+    table.section("Noise", "A test.");
+    table.addChoice<int>("level", level, {{"N0", 0}, {"N3", 3}}, "A level.");
+    table.set("Noise.level=N3");
+    EXPECT_EQ(level, 3);
+    table.set("Noise.level=n0");
+    EXPECT_EQ(level, 0);
+    EXPECT_THAT(table.dump(), HasSubstr("N0"));
+}
+
 TEST(Options, LoadsEveryKind) {
     Sample sample;
     OptionTable table;

@@ -5,8 +5,7 @@
 #include <filesystem>
 
 #include "riftmap/apps/program.h"
-#include "riftmap/sim/simulated_platform.h"
-#include "riftmap/sim/trajectory.h"
+#include "riftmap/apps/simulated_views.h"
 
 namespace riftmap {
 
@@ -23,15 +22,11 @@ class SimulateProgram : public Program {
 
  private:
     void checkOutputs() const;
-    void writeCalibration(const std::filesystem::path& file) const;
+    void writeRawlog(const SimulatedViews& recording);
+    /// NAME + suffix beside --out NAME.rawlog.
     std::filesystem::path beside(const char* suffix) const;
 
-    WorldOptions world_;
-    CameraOptions camera_;
-    NoiseOptions noise_;
-    RenderOptions render_;
-    TrajectoryOptions trajectory_;
-    PoseNoiseOptions poseNoise_;
+    SimulatedViewsOptions options_;
     bool external_ = true;
     bool truthImages_ = false;
 };
