@@ -18,7 +18,10 @@ check_loads() {
     while read -r ini; do
         taken=no
         for program in "$bin"/riftmap-*; do
-            if "$program" "$ini" --dump-config >/dev/null 2>&1; then taken=yes; fi
+            if "$program" "$ini" --dump-config >/dev/null 2>&1; then
+                taken=yes
+                break
+            fi
         done
         if [ $taken = no ]; then
             failed=1

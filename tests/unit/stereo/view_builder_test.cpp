@@ -10,8 +10,8 @@
 #include <stdexcept>
 
 #include "riftmap/core/options.h"
-#include "riftmap/stereo/grey.h"
 #include "riftmap/stereo/disparity_filters.h"
+#include "riftmap/stereo/grey.h"
 
 namespace riftmap {
 namespace {
