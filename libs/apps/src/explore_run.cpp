@@ -1,0 +1,380 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "explore_run.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iostream>
+#include <sstream>
+#include <utility>
+
+#include "riftmap/apps/explore_report.h"
+#include "riftmap/apps/pictures.h"
+#include "riftmap/core/file.h"
+#include "riftmap/planner/paper_view_planner.h"
+
+namespace riftmap {
+
+namespace {
+
+std::string deltaName(double delta) {
+    const double mm = 1000 * delta;
+    const double number = mm < 9.9 ? mm : mm / 10;
+    return std::to_string(std::lround(number)) + (mm < 9.9 ? "mm" : "cm");
+}
+
+Eigen::AlignedBox3d boxAround(const TriangleMesh& mesh) {
+    const Bounds b = bounds(mesh);
+    const Eigen::Vector3d margin = Eigen::Vector3d::Constant(0.02 * b.size().maxCoeff() + 0.01);
+    return {b.min - margin, b.max + margin};
+}
+
+/// Points of a view, every fourth pixel along each axis: for planners that keep a voxel map.
+std::vector<Eigen::Vector3f> cloudOf(const View& view) {
+    std::vector<Eigen::Vector3f> cloud;
+    for (int row = 0; row < view.disparity.height; row += 2) {
+        for (int column = 0; column < view.disparity.width; column += 2) {
+            if (view.disparity.valid(column, row)) {
+                const auto d = static_cast<double>(view.disparity.at(column, row));
+                const Eigen::Vector3d p =
+                    view.world_T_camera * view.camera.backProject(column, row, d);
+                cloud.push_back(p.cast<float>());
+            }
+        }
+    }
+    return cloud;
+}
+
+/// One of the views sources of libs/eval in the loop.
+class BaselinePlanner : public ViewPlanner {
+ public:
+    BaselinePlanner(std::string name, std::unique_ptr<ViewSource> source,
+                    const SimulatedPlatform& platform, const std::vector<Eigen::Vector3f>& cloud)
+        : name_(std::move(name)), source_(std::move(source)), platform_(platform), cloud_(cloud) {}
+
+    std::string name() const override { return name_; }
+    std::optional<ViewPlan> next(Knowledge& /*knowledge*/) override {
+        BaselineState state;
+        state.pose = platform_.pose();
+        state.camera = platform_.camera();
+        state.limits = platform_.limits();
+        state.cloud = cloud_;
+        state.segmentClear = [&](const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+            return platform_.rayCaster().sweptClear(a, b, state.limits.clearance + 1e-3);
+        };
+        auto path = source_->next(state);
+        if (!path || path->empty()) {
+            return std::nullopt;
+        }
+        ViewPlan plan;
+        plan.path = std::move(*path);
+        return plan;
+    }
+
+ private:
+    std::string name_;
+    std::unique_ptr<ViewSource> source_;
+    const SimulatedPlatform& platform_;
+    const std::vector<Eigen::Vector3f>& cloud_;
+};
+
+}  // namespace
+
+ExploreRun::ExploreRun(ExploreProgram& program, RunDirectory& directory)
+    : program_(program),
+      directory_(directory),
+      platform_(makePlatform(program.simulation_, program.seed())),
+      map_(program.graph_, program.stereo_),
+      builder_(program.stereo_),
+      recorder_(directory, program.explore_.judge) {
+    PlannerOptions options = program.planner_;
+    if (program.explore_.knownBox) {
+        target_ = boxAround(platform_->world().mesh);
+        if (options.surfaceBox.empty()) {
+            for (const Eigen::Vector3d& corner : {target_.min(), target_.max()}) {
+                options.surfaceBox.insert(options.surfaceBox.end(),
+                                          {corner.x(), corner.y(), corner.z()});
+            }
+        }
+    }
+    planner_ = makePlanner();
+    if (program.explore_.judge) {
+        const ViewSpace space =
+            viewSpaceOf(platform_->limits(), platform_->camera(), platform_->pose().translation);
+        judge_ = std::make_unique<CoverageJudge>(platform_->world().mesh, platform_->rayCaster(),
+                                                 space, program.eval_);
+        std::vector<std::string> names = {"view", "path_length_m", "expected_gain_m2"};
+        for (const double delta : judge_->deltas()) {
+            names.push_back("c_obs_" + deltaName(delta));
+            names.push_back("c_all_" + deltaName(delta));
+        }
+        curve_ = std::make_unique<CsvWriter>(directory.file("coverage.csv"), names);
+    }
+    if (program.explore_.rawlog) {
+        rawlog_ = std::make_unique<RawlogWriter>(directory.file("run.rawlog"),
+                                                 RawlogWriter::Images::kExternal);
+    }
+    explorer_ = std::make_unique<SurfaceExplorer>(
+        *platform_, graph(), *planner_, options, program.stop_,
+        [this](const StereoObservation& o) { return builder_.build(o); },
+        [this](StereoObservation& o) {
+            if (rawlog_) {
+                o.world_T_camera = rawlog_->write(o);
+            }
+        },
+        [this](const ExploreStep& step, const Knowledge& k) { onStep(step, k); });
+}
+
+std::unique_ptr<ViewPlanner> ExploreRun::makePlanner() {
+    using Kind = ExploreOptions::Planner;
+    const auto baseline = [&](const std::string& name) {
+        return std::make_unique<BaselinePlanner>(
+            name, makeBaseline(name, program_.baseline_, target_, program_.seed()), *platform_,
+            cloud_);
+    };
+    switch (program_.explore_.planner) {
+        case Kind::kPaper:
+            return std::make_unique<PaperViewPlanner>(program_.paper_);
+        case Kind::kRandom:
+            return baseline("random");
+        case Kind::kOrbit:
+            return baseline("orbit");
+        case Kind::kSphere:
+            return baseline("sphere");
+        case Kind::kOctomapFrontier:
+            return baseline("octomap_frontier");
+        case Kind::kRiftmap:
+            break;
+    }
+    return std::make_unique<RiftPlanner>();
+}
+
+/// Index of the headline distance among those that coverage is taken at.
+std::size_t ExploreRun::headlineIndex() const {
+    std::size_t i = 0;
+    while (i + 1 < judge_->deltas().size() && judge_->deltas()[i] < judge_->headline() - 1e-9) {
+        ++i;
+    }
+    return i;
+}
+
+void ExploreRun::collectVertices(bool withNormals) {
+    points_.clear();
+    normals_.clear();
+    colours_.clear();
+    points_.reserve(graph().vertexCount());
+    graph().forEachVertex([&](VertexId id) {
+        if (withNormals) {
+            const Vertex v = graph().vertex(id);
+            points_.push_back(v.position);
+            normals_.push_back(v.normal);
+            colours_.push_back(v.rgb);
+        } else {
+            points_.push_back(graph().position(id));
+        }
+    });
+}
+
+void ExploreRun::onStep(const ExploreStep& step, const Knowledge& knowledge) {
+    taken_.push_back(step.input->world_T_camera);
+    if (program_.explore_.planner != ExploreOptions::Planner::kRiftmap) {
+        cloud_ = cloudOf(*step.input);
+    }
+    StepFigures figures{step, {}, knowledge.ledger().counts()[0]};
+    figures.step.input = nullptr;
+    StepRow row;
+    row.time_ns = step.input->time_ns;
+    row.world_T_camera = step.input->world_T_camera;
+    row.rifts = knowledge.ledger().counts();
+    row.pathLength = step.pathLength;
+    row.stereoMs = step.stereoMs;
+    row.mergeMs = step.mergeMs;
+    row.riftsMs = step.riftsMs;
+    row.planMs = step.planMs;
+    if (judge_) {
+        collectVertices(false);
+        figures.coverage = judge_->coverage(points_);
+        std::vector<Field> fields = {step.view, step.pathLength, step.gain};
+        for (const Coverage& c : figures.coverage) {
+            fields.emplace_back(c.cObs);
+            fields.emplace_back(c.cAll);
+        }
+        curve_->row(fields);
+        row.coverage = figures.coverage[headlineIndex()].cObs;
+    }
+    recorder_.step(graph(), row);
+    history_.push_back(std::move(figures));
+    if (program_.progress()) {
+        showProgress(step, knowledge);
+    }
+}
+
+void ExploreRun::showProgress(const ExploreStep& step, const Knowledge& knowledge) const {
+    const auto n = knowledge.ledger().counts();
+    std::ostringstream line;
+    line.setf(std::ios::fixed);
+    line.precision(1);
+    line << "view " << step.view + 1 << ", " << step.pathLength << " m, " << graph().vertexCount()
+         << " vertices, cells: " << n[0] << " open " << n[2] << " unreachable " << n[3]
+         << " unobservable, gain ";
+    line.precision(3);
+    line << step.gain << " m2, plan " << std::lround(step.planMs) << " merge "
+         << std::lround(step.mergeMs) << " ms";
+    line.precision(2);
+    for (const Coverage& c : history_.back().coverage) {
+        line << ", " << 100 * c.cObs << " % at " << deltaName(c.delta);
+    }
+    std::cerr << line.str() << '\n';
+}
+
+void ExploreRun::run(const std::atomic<bool>& interrupt) {
+    try {
+        explorer_->run(interrupt);
+    } catch (const CollisionError& e) {
+        finish(e.what());
+        throw;
+    }
+    finish({});
+}
+
+void ExploreRun::finish(const std::string& error) {
+    program_.stopReason = error.empty() ? explorer_->stopReason() : "collision";
+    program_.views = explorer_->views();
+    program_.pathLength = explorer_->pathLength();
+    program_.collisions = platform_->collisions();
+    if (rawlog_) {
+        rawlog_->finish();
+    }
+    collectVertices(true);
+    SceneExtras scene;
+    scene.taken = taken_;
+    const YamlMap more = figures(error);
+    recorder_.finish(map_, certificate(), scene, program_.stopReason, more);
+    MapPictureParts parts;
+    parts.taken = taken_;
+    writePicture(directory_.file("map.png"), mapPicture(graph(), parts));
+    writeReport();
+}
+
+std::vector<RiftRow> ExploreRun::certificate() const {
+    std::vector<RiftRow> rows;
+    for (const auto& [key, r] : explorer_->knowledge().ledger().records()) {
+        RiftRow row;
+        row.id = rows.size();
+        row.state = nameOf(r.state);
+        row.reason = r.reason;
+        row.type = kindNames(r.cell.kinds);
+        row.centre = r.cell.openPosition;
+        row.normal = r.cell.normal;
+        row.openVertices = r.cell.open;
+        row.edges = r.cell.highEdges;
+        row.attempts = r.attempts.size();
+        rows.push_back(row);
+    }
+    return rows;
+}
+
+/// What the summary tells beyond what every mapping run tells.
+YamlMap ExploreRun::figures(const std::string& error) {
+    YamlMap summary;
+    summary.set("planner", planner_->name());
+    summary.set("collisions", program_.collisions);
+    if (!error.empty()) {
+        summary.set("error", error);
+    }
+    if (judge_ && !history_.empty()) {
+        std::vector<Eigen::Vector3f> rims;
+        for (const auto& [key, r] : explorer_->knowledge().ledger().records()) {
+            if (r.state != RiftState::kResolved) {
+                rims.push_back(r.cell.openPosition);
+            }
+        }
+        program_.coverage = judge_->evaluate(points_, normals_, &rims);
+        for (const DistanceFigures& f : program_.coverage.at) {
+            const std::string d = deltaName(f.delta);
+            summary.set("c_obs_" + d, f.cObs);
+            summary.set("c_all_" + d, f.cAll);
+            summary.set("c_obs_strict_" + d, f.cObsStrict);
+            summary.set("accuracy_" + d, f.accuracy);
+            summary.set("f_score_" + d, f.fScore);
+            summary.set("spurious_" + d, f.spurious);
+        }
+        summary.set("error_median_m", program_.coverage.errorMedian);
+        summary.set("error_p95_m", program_.coverage.errorP95);
+        summary.set("explained", program_.coverage.explained);
+        CoverageCurve curve;
+        for (const StepFigures& f : history_) {
+            curve.add(f.step.pathLength, f.coverage[headlineIndex()].cObs);
+        }
+        summary.set("headline_delta_m", judge_->headline());
+        summary.set("auc_10", curve.areaUnderCurve(10));
+        summary.set("auc_30", curve.areaUnderCurve(30));
+        for (const int share : {90, 95, 99}) {
+            summary.set("views_to_" + std::to_string(share), curve.viewsTo(share / 100.0));
+            summary.set("path_to_" + std::to_string(share) + "_m", curve.metresTo(share / 100.0));
+        }
+    }
+    return summary;
+}
+
+void ExploreRun::writeReport() const {
+    ExploreReport report;
+    report.title = "Riftmap explored " + platform_->world().name;
+    report.points = points_;
+    report.colours = colours_;
+    for (const Pose& pose : taken_) {
+        report.path.push_back(pose.translation.cast<float>());
+    }
+    report.pictures = {directory_.file("map.png")};
+    const auto counts = explorer_->knowledge().ledger().counts();
+    for (const auto& [key, r] : explorer_->knowledge().ledger().records()) {
+        if (r.state != RiftState::kResolved && r.state != RiftState::kBelowResolution) {
+            report.rifts.push_back(r.cell.openPosition);
+        }
+    }
+    const auto fact = [&](const std::string& name, const Field& value) {
+        report.facts.emplace_back(name, value.text());
+    };
+    fact("stop reason", program_.stopReason);
+    fact("views", explorer_->views());
+    fact("path [m]", explorer_->pathLength());
+    fact("vertices", graph().vertexCount());
+    fact("surface [m2]", graph().surfaceArea());
+    for (std::size_t i = 0; i < counts.size(); ++i) {
+        fact(std::string("tears ") + nameOf(static_cast<RiftState>(i)), counts[i]);
+    }
+    for (const DistanceFigures& f : program_.coverage.at) {
+        fact("covered within " + deltaName(f.delta) + " (observable)", f.cObs);
+        fact("vertices within " + deltaName(f.delta) + " of the surface", f.accuracy);
+    }
+    ReportDiagram byView{"Covered share of the observable surface", "views", "share", {}};
+    ReportDiagram byPath{"Covered share of the observable surface", "path [m]", "share", {}};
+    ReportDiagram open{"Open tears", "views", "cells", {{"open", {}, {}}}};
+    ReportDiagram time{"Time a view", "views", "ms", {{"plan", {}, {}}, {"merge", {}, {}}}};
+    for (const StepFigures& f : history_) {
+        const double n = static_cast<double>(f.step.view + 1);
+        for (std::size_t i = 0; i < f.coverage.size(); ++i) {
+            if (byView.curves.size() <= i) {
+                byView.curves.push_back({deltaName(f.coverage[i].delta), {}, {}});
+                byPath.curves.push_back(byView.curves.back());
+            }
+            byView.curves[i].x.push_back(n);
+            byView.curves[i].y.push_back(f.coverage[i].cObs);
+            byPath.curves[i].x.push_back(f.step.pathLength);
+            byPath.curves[i].y.push_back(f.coverage[i].cObs);
+        }
+        open.curves[0].x.push_back(n);
+        open.curves[0].y.push_back(static_cast<double>(f.open));
+        time.curves[0].x.push_back(n);
+        time.curves[0].y.push_back(f.step.planMs);
+        time.curves[1].x.push_back(n);
+        time.curves[1].y.push_back(f.step.mergeMs);
+    }
+    if (judge_) {
+        report.diagrams = {byView, byPath};
+    }
+    report.diagrams.push_back(open);
+    report.diagrams.push_back(time);
+    writeExploreReport(directory_.file("report.html"), report);
+}
+
+}  // namespace riftmap

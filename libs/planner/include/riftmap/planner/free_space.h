@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <vector>
+
+#include "riftmap/core/view.h"
+#include "riftmap/planner/sensor_model.h"
+
+namespace riftmap {
+
+/// What is known of the space between the surfaces, from what the views saw through: a byte a
+/// voxel over the workspace. A voxel is free if some view measured only surfaces behind the whole
+/// of it. Answers where the camera may fly, how far that is, and where the unknown begins.
+/// Map frame, metres. Reading is thread-safe while nothing writes.
+class FreeSpace {
+ public:
+    enum class State { kUnknown, kFree, kSurface };
+
+    /// Covers `box`. Throws std::invalid_argument for an empty box, a voxel size that is not
+    /// positive or more than 2^27 voxels.
+    FreeSpace(const Eigen::AlignedBox3d& box, double voxelSize);
+
+    double voxelSize() const { return voxel_; }
+    std::size_t voxelCount() const { return voxels_.size(); }
+    const Eigen::AlignedBox3d& box() const { return box_; }
+
+    /// Free because it is known beforehand: everything outside of `surfaces`.
+    void declareFreeOutside(const Eigen::AlignedBox3d& surfaces);
+    /// Free because the camera is there with its clearance.
+    void declareFree(const Eigen::Vector3d& centre, double radius);
+    /// What a view saw through. `backgroundIsFree`: rays that met nothing within the range make
+    /// voxels known (no surface to look for there), but not free to fly through.
+    void carve(const View& view, const SensorModel& sensor, bool backgroundIsFree);
+    /// Marks the voxels of these points as surface, and no others.
+    void setSurface(const std::vector<Eigen::Vector3d>& points);
+
+    State at(const Eigen::Vector3d& point) const;
+    /// Part of a ray in unknown space.
+    struct UnknownRun {
+        double begin = -1;  ///< distance of the first unknown voxel [m]; negative: there is none
+        double end = -1;    ///< where known space begins again, or the ray ends [m]
+    };
+    /// The unknown space that a ray meets first through free space, before `length` [m]. The
+    /// direction is a unit vector.
+    UnknownRun firstUnknown(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
+                            double length) const;
+    /// Notes that a view was taken to see this place; places that are unknown still after `kTries`
+    /// views do not count as unknown any more.
+    void noteTry(const Eigen::Vector3d& point);
+    static constexpr std::uint8_t kTries = 2;
+
+    /// Finds where a ball of radius `clearance` can go from `start` inside `limits`, straight from
+    /// voxel centre to voxel centre, and how far that is. To be called again after changes.
+    void updateReach(const Eigen::Vector3d& start, double clearance,
+                     const Eigen::AlignedBox3d& limits);
+    /// Length of the way to the voxel of this place [m]; infinite if it is not reachable.
+    double distanceTo(const Eigen::Vector3d& point) const;
+    /// Centre of the voxel that holds this place.
+    Eigen::Vector3d snap(const Eigen::Vector3d& point) const;
+    /// The way from the start of the last updateReach() to the voxel of `goal`, with needless
+    /// corners cut; start first. Empty if it is not reachable.
+    std::vector<Eigen::Vector3d> pathTo(const Eigen::Vector3d& goal) const;
+    /// True if the straight segment stays in voxels that have the clearance.
+    bool segmentClear(const Eigen::Vector3d& a, const Eigen::Vector3d& b) const;
+    /// Centres of all reachable voxels, every `stride`-th along each axis.
+    std::vector<Eigen::Vector3d> reachable(int stride) const;
+
+ private:
+    static constexpr std::uint8_t kFreeBit = 1;   ///< seen through
+    static constexpr std::uint8_t kKnownBit = 2;  ///< its centre was seen through, or is no place
+                                                  ///< to look for surface; not enough to fly there
+    static constexpr std::uint8_t kSurfaceBit = 4;
+    static constexpr int kTryShift = 4;  ///< count of vain tries in the upper bits
+
+    bool inside(const Eigen::Vector3i& v) const {
+        return (v.array() >= 0).all() && (v.array() < size_.array()).all();
+    }
+    std::size_t index(const Eigen::Vector3i& v) const {
+        return (static_cast<std::size_t>(v.z()) * static_cast<std::size_t>(size_.y()) +
+                static_cast<std::size_t>(v.y())) *
+                   static_cast<std::size_t>(size_.x()) +
+               static_cast<std::size_t>(v.x());
+    }
+    Eigen::Vector3i coordinates(std::size_t index) const;
+    Eigen::Vector3i voxelOf(const Eigen::Vector3d& point) const;
+    Eigen::Vector3d centre(const Eigen::Vector3i& v) const {
+        return origin_ + (v.cast<double>() + Eigen::Vector3d::Constant(0.5)) * voxel_;
+    }
+    bool passable(std::uint8_t voxel) const {
+        return (voxel & kFreeBit) != 0 && (voxel & kSurfaceBit) == 0;
+    }
+    void markClear(double clearance, const Eigen::AlignedBox3d& limits);
+    void searchFrom(const Eigen::Vector3i& start);
+
+    Eigen::AlignedBox3d box_;
+    double voxel_;
+    Eigen::Vector3d origin_;
+    Eigen::Vector3i size_;
+    std::vector<std::uint8_t> voxels_;
+    std::vector<std::uint8_t> clear_;    ///< 1 = the ball fits here
+    std::vector<float> distance_;        ///< from the start [m]
+    std::vector<std::uint32_t> parent_;  ///< voxel before it on the way
+    Eigen::Vector3d start_ = Eigen::Vector3d::Zero();
+};
+
+}  // namespace riftmap

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "riftmap/planner/surface_summary.h"
+
+namespace riftmap {
+
+/// What is to be said of a tear in the surface.
+enum class RiftState {
+    kOpen,             ///< a view may close it
+    kDeferred,         ///< it may, but the run ended before (limits on views, metres, seconds)
+    kUnreachable,      ///< no place known to be free lies within the range of it
+    kUnobservable,     ///< views from several sides did not close it, or none sees it
+    kBelowResolution,  ///< smaller than the surface was asked to be known
+    kResolved,         ///< was open, is closed
+};
+inline constexpr std::size_t kRiftStates = 6;
+/// "open", "deferred", "unreachable", "unobservable", "below_resolution", "resolved".
+const char* nameOf(RiftState state);
+
+/// A try to close a tear.
+struct Attempt {
+    Eigen::Vector3f direction;  ///< from the tear to the camera, unit
+    float distance;             ///< [m]
+};
+
+/// The piece of a rift within one cell of the SurfaceSummary: what was tried and what came of it.
+struct RiftRecord {
+    SurfaceCell cell;  ///< as last seen with a tear in it
+    RiftState state = RiftState::kOpen;
+    std::string reason;
+    std::vector<Attempt> attempts;   ///< those that did not help
+    int reconsidered = 0;            ///< times it was opened again
+    std::uint32_t verticesThen = 0;  ///< in the cell when it was given up
+};
+
+/// The memory of the run: every tear that was ever seen, by cell. A try that closed nothing is
+/// remembered; after several different ones the tear counts as unobservable, until the surface at
+/// it changes.
+class RiftLedger {
+ public:
+    /// `resolution` [m]: tears shorter than about this do not count. `maxAttempts` >= 1.
+    RiftLedger(double resolution, int maxAttempts);
+
+    /// Reads the cells that changed.
+    void update(const SurfaceSummary& summary);
+    /// A view from `eye` was taken to close these cells, and has been merged and summed up.
+    /// `before`: their tears until then, as tear() gives them.
+    void judge(const SurfaceSummary& summary, const std::vector<std::uint64_t>& keys,
+               const std::vector<float>& before, const Eigen::Vector3d& eye);
+    /// Gives a cell up.
+    void giveUp(std::uint64_t key, RiftState state, const std::string& reason);
+    /// Ends the run: what is open becomes deferred.
+    void deferOpen(const std::string& reason);
+
+    /// Size of the tear in a cell [m^2]: area that closing it may bring at least.
+    float tear(const SurfaceCell& cell, double cellSize) const;
+    const std::map<std::uint64_t, RiftRecord>& records() const { return records_; }
+    std::array<std::size_t, kRiftStates> counts() const;
+    /// Share of the area seen again that a vain try from here repeats: true if some attempt looked
+    /// from nearly the same side and distance.
+    static bool tried(const RiftRecord& record, const Eigen::Vector3d& eye);
+
+ private:
+    void updateCell(const SurfaceCell& cell, double cellSize);
+
+    double resolution_;
+    int maxAttempts_;
+    std::map<std::uint64_t, RiftRecord> records_;
+};
+
+}  // namespace riftmap

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "riftmap/core/camera.h"
+#include "riftmap/core/platform.h"
+#include "riftmap/core/pose.h"
+#include "riftmap/core/view.h"
+
+namespace riftmap {
+
+/// What a view will be able to measure: the true field of view and the range in depth.
+struct SensorModel {
+    StereoCamera camera;
+    int firstColumn = 0;        ///< columns left of it have no partner in the right image [px]
+    double nearLimit = 0;       ///< depth z [m]; nearer surfaces are not measured
+    double farLimit = 1e3;      ///< depth z [m]; nor are those farther
+    double sigmaDisparity = 0;  ///< median of the valid pixels [px]
+
+    /// As the last view was, within the platform's range.
+    static SensorModel of(const View& view, const PlatformLimits& limits);
+
+    /// Largest depth [m] at which one view measures as finely (pixel spacing) and as accurately
+    /// (sigma_z <= resolution / 2) as asked; within the range.
+    double goodDepth(double resolution) const;
+    /// Camera at `eye` with a level horizon and `target` in the middle of the true field of view
+    /// (the part of the image that has a partner).
+    Pose lookingAt(const Eigen::Vector3d& eye, const Eigen::Vector3d& target) const;
+};
+
+}  // namespace riftmap

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "riftmap/core/options.h"
+#include "riftmap/core/platform.h"
+#include "riftmap/core/view.h"
+#include "riftmap/graph/pixel_graph.h"
+#include "riftmap/planner/view_planner.h"
+
+namespace riftmap {
+
+/// Section [Stop]: when a run ends although something is left to see.
+struct StopOptions {
+    int maxViews = 500;       ///< [views]
+    double maxMetres = 1e6;   ///< of path [m]
+    double maxSeconds = 1e6;  ///< of running [s]
+    void describe(OptionTable& table);
+};
+
+/// What one view of the run was.
+struct ExploreStep {
+    std::size_t view = 0;         ///< from 0
+    const View* input = nullptr;  ///< valid during the call
+    MergeResult merged;
+    std::size_t riftCount = 0;  ///< of the graph
+    double gain = 0;            ///< that the plan expected [m^2]
+    double pathLength = 0;      ///< so far [m]
+    double grabMs = 0, stereoMs = 0, mergeMs = 0, riftsMs = 0;
+    double knowledgeMs = 0;  ///< keeping the planner's picture of the map up to date
+    double planMs = 0;       ///< choice of this view, with knowledgeMs of the view before
+    double seconds = 0;      ///< since the start
+};
+
+/// The loop: grab, match, merge, find the rifts, plan, move; until no view is worth it any more.
+/// Map frame. Not thread-safe.
+class SurfaceExplorer {
+ public:
+    /// An observation as it comes from the platform becomes the one that is used (written to a
+    /// file and rounded as there, for instance), and then the view that is merged.
+    using Record = std::function<void(StereoObservation&)>;
+    using Build = std::function<View(const StereoObservation&)>;
+    using OnStep = std::function<void(const ExploreStep&, const Knowledge&)>;
+
+    /// Everything must outlive the explorer. `record` and `onStep` may be empty.
+    SurfaceExplorer(CameraPlatform& platform, PixelGraph& graph, ViewPlanner& planner,
+                    const PlannerOptions& options, const StopOptions& stop, Build build,
+                    Record record, OnStep onStep);
+
+    /// Runs to the end; `interrupt` (e.g. set by a signal handler) ends it after the view at work.
+    /// Throws CollisionError where the platform hits something; the map is complete up to there.
+    void run(const std::atomic<bool>& interrupt);
+
+    /// "complete", "max_views", "max_metres", "max_seconds", "interrupted".
+    const std::string& stopReason() const { return stopReason_; }
+    const Knowledge& knowledge() const { return knowledge_; }
+    std::size_t views() const { return knowledge_.views(); }
+    double pathLength() const { return pathLength_; }
+
+ private:
+    void look(const std::optional<ViewPlan>& plan, double planMs);
+    std::optional<ViewPlan> choose(double& planMs);
+    void move(ViewPlan& plan);
+    bool limitReached(double seconds);
+
+    CameraPlatform& platform_;
+    PixelGraph& graph_;
+    ViewPlanner& planner_;
+    StopOptions stop_;
+    Build build_;
+    Record record_;
+    OnStep onStep_;
+    Knowledge knowledge_;
+    std::string stopReason_;
+    double pathLength_ = 0;
+    double lastKnowledgeMs_ = 0;
+    std::function<double()> clock_;  ///< seconds since the start
+};
+
+}  // namespace riftmap

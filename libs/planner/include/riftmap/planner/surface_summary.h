@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <map>
+#include <vector>
+
+#include "riftmap/core/view.h"
+#include "riftmap/graph/pixel_graph.h"
+
+namespace riftmap {
+
+/// The vertices of the map within a small cube, taken together. Map frame, metres.
+struct SurfaceCell {
+    std::uint64_t key = 0;  ///< names the cube; stays the same while the map grows
+    Eigen::Vector3f position = Eigen::Vector3f::Zero();  ///< mean of the vertices
+    Eigen::Vector3f normal = Eigen::Vector3f::Zero();    ///< mean, unit or zero
+    std::uint32_t vertices = 0;
+    std::uint32_t open = 0;       ///< vertices that are not closed
+    std::uint32_t highEdges = 0;  ///< at the open vertices, each counted at both ends
+    std::uint8_t kinds = 0;       ///< OpenKind bits of those
+    Eigen::Vector3f openPosition = Eigen::Vector3f::Zero();  ///< mean of the open vertices
+    /// Over the rim: from the neighbours of the open vertices towards where none are; in the
+    /// surface, length at most 1 (short where the tear runs around).
+    Eigen::Vector3f outward = Eigen::Vector3f::Zero();
+    float rim = 0;     ///< length of the tear in this cell, about [m]
+    float coarse = 0;  ///< area sampled too sparsely or known too badly, about [m^2]
+};
+
+/// The map as the planner looks at it: a few thousand cells instead of millions of vertices, kept
+/// up to date from what a view touched, so that planning takes the same time on any map. Reading
+/// is thread-safe while nothing writes.
+class SurfaceSummary {
+ public:
+    /// `cell`: edge of a cell [m], > 0.
+    explicit SurfaceSummary(double cell);
+
+    double cellSize() const { return cell_; }
+    /// Sums up anew all blocks of cells that this view has surface in or looks through.
+    void update(const PixelGraph& graph, const View& view);
+
+    struct Block {
+        Eigen::AlignedBox3d box;         ///< of the cube of cells
+        std::vector<SurfaceCell> cells;  ///< ascending in key
+    };
+    /// All blocks by key, in ascending order.
+    const std::map<std::uint64_t, Block>& blocks() const { return blocks_; }
+    /// Keys of the blocks that the last update worked on.
+    const std::vector<std::uint64_t>& changed() const { return changed_; }
+    /// Nothing if the cell holds no vertex.
+    const SurfaceCell* find(std::uint64_t key) const;
+    std::uint64_t keyOf(const Eigen::Vector3d& point) const;
+    std::size_t cellCount() const;
+
+ private:
+    static constexpr int kCellsPerSide = 8;
+
+    Block build(const PixelGraph& graph, std::uint64_t blockKey) const;
+
+    double cell_;
+    std::map<std::uint64_t, Block> blocks_;
+    std::vector<std::uint64_t> changed_;
+};
+
+}  // namespace riftmap

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "riftmap/core/options.h"
+#include "riftmap/core/platform.h"
+#include "riftmap/graph/pixel_graph.h"
+#include "riftmap/planner/free_space.h"
+#include "riftmap/planner/rift_ledger.h"
+#include "riftmap/planner/sensor_model.h"
+#include "riftmap/planner/surface_summary.h"
+#include "riftmap/planner/view_scorer.h"
+
+namespace riftmap {
+
+/// Section [Planner].
+struct PlannerOptions {
+    double cellSize = 0;    ///< of the surface summary [m]; 0 = 4 target resolutions
+    double voxelSize = 0;   ///< of the free space [m]; 0 = by the workspace
+    double viewCost = 1.0;  ///< what taking a view costs, in metres of path
+    double minGain =
+        5e-4;             ///< a view that adds less than this share of the surface is not worth it
+    int maxAttempts = 3;  ///< views of a tear that may fail before it counts as unobservable
+    double unknownWeight = 0.5;     ///< of unknown space looked into, against tears to be closed
+    double clearanceMargin = 0.02;  ///< beyond the platform's clearance [m]
+    int targets = 48;               ///< tears that candidates are made for, in one plan
+    int places = 32;                ///< places for candidates that aim at no tear, in one plan
+    /// Surfaces lie in this box, the space around it is free: xmin ymin zmin xmax ymax zmax [m].
+    /// Empty: nothing is known beforehand.
+    std::vector<double> surfaceBox;
+    bool backgroundIsFree = false;  ///< pixels without a match show that nothing is there
+    std::uint64_t seed = 0;         ///< of the candidates; the program sets it
+    void describe(OptionTable& table);
+};
+
+/// What the run knows so far: the map and what follows from it. Map frame, metres.
+class Knowledge {
+ public:
+    Knowledge(const PixelGraph& graph, const PlatformLimits& limits, const PlannerOptions& options);
+
+    /// Takes in a view that was just merged into the graph.
+    void update(const View& view);
+    /// Ways from where the camera is.
+    void updateReach();
+
+    const PixelGraph& graph() const { return *graph_; }
+    const PlatformLimits& limits() const { return limits_; }
+    const PlannerOptions& options() const { return options_; }
+    const SensorModel& sensor() const { return sensor_; }
+    const SurfaceSummary& summary() const { return summary_; }
+    const FreeSpace& space() const { return space_; }
+    FreeSpace& space() { return space_; }
+    const RiftLedger& ledger() const { return ledger_; }
+    RiftLedger& ledger() { return ledger_; }
+    const Pose& camera() const { return camera_; }
+    std::size_t views() const { return views_; }
+    /// Where the camera may be: the workspace within the platform's range of heights.
+    const Eigen::AlignedBox3d& cameraBox() const { return cameraBox_; }
+    bool tiltAllowed(const Pose& pose) const;
+    /// Box of the surfaces, if it was declared.
+    const std::optional<Eigen::AlignedBox3d>& surfaceBox() const { return surfaceBox_; }
+    double resolution() const { return graph_->options().targetResolution; }
+    /// Poses from the camera to a reachable place, turning evenly on the way; the goal last.
+    std::vector<Pose> pathTo(const Pose& goal) const;
+
+ private:
+    const PixelGraph* graph_;
+    PlatformLimits limits_;
+    PlannerOptions options_;
+    std::optional<Eigen::AlignedBox3d> surfaceBox_;
+    Eigen::AlignedBox3d cameraBox_;
+    SensorModel sensor_;
+    SurfaceSummary summary_;
+    FreeSpace space_;
+    RiftLedger ledger_;
+    Pose camera_;
+    std::size_t views_ = 0;
+};
+
+/// Where to go next.
+struct ViewPlan {
+    std::vector<Pose> path;                ///< last: where the view is to be taken
+    double gain = 0;                       ///< expected [m^2]
+    std::vector<std::uint64_t> cells;      ///< tears that the view is to close
+    std::vector<Eigen::Vector3d> unknown;  ///< unknown places that it is to look into
+};
+
+/// Chooses views. Not thread-safe.
+class ViewPlanner {
+ public:
+    virtual ~ViewPlanner() = default;
+    virtual std::string name() const = 0;
+    /// The next view; nothing if no view is worth it any more. May give tears up in the ledger.
+    virtual std::optional<ViewPlan> next(Knowledge& knowledge) = 0;
+};
+
+/// The default planner: views that bring most for their way (see doc/algorithm).
+class RiftPlanner : public ViewPlanner {
+ public:
+    std::string name() const override { return "riftmap"; }
+    std::optional<ViewPlan> next(Knowledge& knowledge) override;
+
+ private:
+    std::vector<Pose> pool_;  ///< good views that were not taken yet
+};
+
+}  // namespace riftmap

@@ -1,0 +1,425 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "riftmap/planner/free_space.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <queue>
+#include <stdexcept>
+#include <string>
+
+namespace riftmap {
+
+namespace {
+
+constexpr float kFar = std::numeric_limits<float>::infinity();
+constexpr std::uint32_t kNoParent = 0xFFFFFFFFU;
+
+/// Depths of a view for questions about rectangles: least depth and share of measured pixels.
+class DepthRectangles {
+ public:
+    DepthRectangles(const View& view, const SensorModel& sensor, bool backgroundIsFree)
+        : width_(view.disparity.width), height_(view.disparity.height) {
+        const auto n = static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_);
+        std::vector<float> depth(n, kFar);
+        measured_.assign(
+            static_cast<std::size_t>(width_ + 1) * static_cast<std::size_t>(height_ + 1), 0);
+        for (int row = 0; row < height_; ++row) {
+            int inRow = 0;
+            for (int column = 0; column < width_; ++column) {
+                const std::size_t i = view.disparity.index(column, row);
+                const bool valid = view.disparity.valid(column, row);
+                if (valid) {
+                    depth[i] = static_cast<float>(
+                        view.camera.depth(static_cast<double>(view.disparity.disparity[i])));
+                } else if (backgroundIsFree) {
+                    depth[i] = static_cast<float>(sensor.farLimit);
+                }
+                inRow += valid ? 1 : 0;
+                measured_[sum(column + 1, row + 1)] = measured_[sum(column + 1, row)] + inRow;
+            }
+        }
+        levels_.push_back({width_, height_, std::move(depth)});
+        while (levels_.back().width > 1 && levels_.back().height > 1) {
+            levels_.push_back(halved(levels_.back()));
+        }
+    }
+
+    /// Least depth over the pixels [c0, c1] x [r0, r1], or a little more than them; pixels without
+    /// a measurement do not count.
+    float least(int c0, int r0, int c1, int r1) const {
+        int level = 0;
+        while (std::max((c1 >> level) - (c0 >> level), (r1 >> level) - (r0 >> level)) > 3 &&
+               level + 1 < static_cast<int>(levels_.size())) {
+            ++level;
+        }
+        const Level& l = levels_[static_cast<std::size_t>(level)];
+        float z = kFar;
+        for (int r = r0 >> level; r <= std::min(r1 >> level, l.height - 1); ++r) {
+            for (int c = c0 >> level; c <= std::min(c1 >> level, l.width - 1); ++c) {
+                z = std::min(
+                    z, l.depth[static_cast<std::size_t>(r) * static_cast<std::size_t>(l.width) +
+                               static_cast<std::size_t>(c)]);
+            }
+        }
+        return z;
+    }
+    double measuredShare(int c0, int r0, int c1, int r1) const {
+        const int n = measured_[sum(c1 + 1, r1 + 1)] - measured_[sum(c0, r1 + 1)] -
+                      measured_[sum(c1 + 1, r0)] + measured_[sum(c0, r0)];
+        return n / static_cast<double>((c1 - c0 + 1) * (r1 - r0 + 1));
+    }
+
+ private:
+    struct Level {
+        int width, height;
+        std::vector<float> depth;
+    };
+    static Level halved(const Level& fine) {
+        Level coarse{(fine.width + 1) / 2, (fine.height + 1) / 2, {}};
+        coarse.depth.assign(
+            static_cast<std::size_t>(coarse.width) * static_cast<std::size_t>(coarse.height), kFar);
+        for (int r = 0; r < fine.height; ++r) {
+            for (int c = 0; c < fine.width; ++c) {
+                float& z = coarse.depth[static_cast<std::size_t>(r / 2) *
+                                            static_cast<std::size_t>(coarse.width) +
+                                        static_cast<std::size_t>(c / 2)];
+                z = std::min(
+                    z,
+                    fine.depth[static_cast<std::size_t>(r) * static_cast<std::size_t>(fine.width) +
+                               static_cast<std::size_t>(c)]);
+            }
+        }
+        return coarse;
+    }
+    std::size_t sum(int column, int row) const {
+        return static_cast<std::size_t>(row) * static_cast<std::size_t>(width_ + 1) +
+               static_cast<std::size_t>(column);
+    }
+
+    int width_, height_;
+    std::vector<Level> levels_;
+    std::vector<int> measured_;  ///< integral image of the valid pixels
+};
+
+/// Offsets of all voxels nearer than the radius.
+std::vector<Eigen::Vector3i> ball(double radiusInVoxels) {
+    const int r = static_cast<int>(std::ceil(radiusInVoxels));
+    std::vector<Eigen::Vector3i> offsets;
+    for (int z = -r; z <= r; ++z) {
+        for (int y = -r; y <= r; ++y) {
+            for (int x = -r; x <= r; ++x) {
+                const Eigen::Vector3i o(x, y, z);
+                if (o.cast<double>().norm() < radiusInVoxels) {
+                    offsets.push_back(o);
+                }
+            }
+        }
+    }
+    return offsets;
+}
+
+}  // namespace
+
+FreeSpace::FreeSpace(const Eigen::AlignedBox3d& box, double voxelSize)
+    : box_(box), voxel_(voxelSize), origin_(box.min()) {
+    if (box.isEmpty() || !(voxelSize > 0)) {
+        throw std::invalid_argument("free space: empty box or no voxel size");
+    }
+    const Eigen::Vector3d count = (box.sizes() / voxelSize).array().ceil().max(1.0);
+    if (count.prod() > 134217728.0) {
+        throw std::invalid_argument("free space: " + std::to_string(count.prod()) +
+                                    " voxels are too many; use a larger voxel or a smaller box");
+    }
+    size_ = count.cast<int>();
+    voxels_.assign(static_cast<std::size_t>(count.prod()), 0);
+}
+
+Eigen::Vector3i FreeSpace::coordinates(std::size_t index) const {
+    const auto nx = static_cast<std::size_t>(size_.x());
+    const auto ny = static_cast<std::size_t>(size_.y());
+    return {static_cast<int>(index % nx), static_cast<int>(index / nx % ny),
+            static_cast<int>(index / nx / ny)};
+}
+
+Eigen::Vector3i FreeSpace::voxelOf(const Eigen::Vector3d& point) const {
+    return ((point - origin_) / voxel_).array().floor().cast<int>();
+}
+
+Eigen::Vector3d FreeSpace::snap(const Eigen::Vector3d& point) const {
+    return centre(voxelOf(point));
+}
+
+void FreeSpace::declareFreeOutside(const Eigen::AlignedBox3d& surfaces) {
+    for (std::size_t i = 0; i < voxels_.size(); ++i) {
+        if (surfaces.exteriorDistance(centre(coordinates(i))) > 0.5 * voxel_) {
+            voxels_[i] |= kFreeBit | kKnownBit;
+        }
+    }
+}
+
+void FreeSpace::declareFree(const Eigen::Vector3d& middle, double radius) {
+    const Eigen::Vector3i v = voxelOf(middle);
+    for (const Eigen::Vector3i& o : ball(radius / voxel_ + 1.0)) {
+        const Eigen::Vector3i w = v + o;
+        if (inside(w) && (centre(w) - middle).norm() < radius) {
+            voxels_[index(w)] |= kFreeBit;
+        }
+    }
+}
+
+void FreeSpace::carve(const View& view, const SensorModel& sensor, bool backgroundIsFree) {
+    const DepthRectangles depth(view, sensor, backgroundIsFree);
+    const StereoCamera& camera = view.camera;
+    const Pose camera_T_world = view.world_T_camera.inverse();
+    const double radius = 0.87 * voxel_;  // of the ball around a voxel
+    constexpr double kMeasured = 0.8;     // of the pixels over a voxel that is called free
+    const int firstColumn = view.disparity.firstColumn;
+    const int width = view.disparity.width;
+    const int height = view.disparity.height;
+    tbb::parallel_for(
+        tbb::blocked_range<int>(0, size_.z()), [&](const tbb::blocked_range<int>& zs) {
+            for (int z = zs.begin(); z < zs.end(); ++z) {
+                for (int y = 0; y < size_.y(); ++y) {
+                    Eigen::Vector3d p = camera_T_world * centre({0, y, z});
+                    const Eigen::Vector3d step = camera_T_world.rotation.col(0) * voxel_;
+                    std::size_t i = index({0, y, z});
+                    for (int x = 0; x < size_.x(); ++x, ++i, p += step) {
+                        if (p.z() < radius || p.z() > sensor.farLimit ||
+                            (voxels_[i] & kFreeBit) != 0) {
+                            continue;
+                        }
+                        const Eigen::Vector2d uv = camera.project(p);
+                        const double px = camera.fx * radius / p.z();
+                        const int c0 = static_cast<int>(std::floor(uv.x() - px));
+                        const int c1 = static_cast<int>(std::ceil(uv.x() + px));
+                        const int r0 = static_cast<int>(std::floor(uv.y() - px));
+                        const int r1 = static_cast<int>(std::ceil(uv.y() + px));
+                        const int c = static_cast<int>(std::lround(uv.x()));
+                        const int r = static_cast<int>(std::lround(uv.y()));
+                        if (c < firstColumn || r < 0 || c >= width || r >= height) {
+                            continue;
+                        }
+                        // A voxel that the surface cuts is never free as a whole, and need not hold
+                        // a vertex: it is known nevertheless.
+                        const float at = depth.least(c, r, c, r);
+                        const bool measured = view.disparity.valid(c, r);
+                        if ((measured || backgroundIsFree) &&
+                            p.z() < static_cast<double>(at) + 0.5 * voxel_) {
+                            voxels_[i] |= kKnownBit;
+                        }
+                        // Near the camera few voxels are in the image as a whole. Of one whose
+                        // middle is, what sticks out borders on a voxel that is not free, and keeps
+                        // the distance that is kept to that one.
+                        const int a = std::max(c0, firstColumn);
+                        const int b = std::max(r0, 0);
+                        const int e = std::min(c1, width - 1);
+                        const int f = std::min(r1, height - 1);
+                        if (depth.measuredShare(a, b, e, f) >= kMeasured &&
+                            static_cast<double>(depth.least(a, b, e, f)) > p.z() + radius) {
+                            voxels_[i] |= kFreeBit;
+                        }
+                    }
+                }
+            }
+        });
+}
+
+void FreeSpace::setSurface(const std::vector<Eigen::Vector3d>& points) {
+    for (std::uint8_t& voxel : voxels_) {
+        voxel = static_cast<std::uint8_t>(voxel & ~kSurfaceBit);
+    }
+    for (const Eigen::Vector3d& point : points) {
+        const Eigen::Vector3i v = voxelOf(point);
+        if (inside(v)) {
+            voxels_[index(v)] |= kSurfaceBit;
+        }
+    }
+}
+
+FreeSpace::State FreeSpace::at(const Eigen::Vector3d& point) const {
+    const Eigen::Vector3i v = voxelOf(point);
+    if (!inside(v)) {
+        return State::kUnknown;
+    }
+    const std::uint8_t voxel = voxels_[index(v)];
+    if ((voxel & kSurfaceBit) != 0) {
+        return State::kSurface;
+    }
+    return (voxel & (kFreeBit | kKnownBit)) != 0 ? State::kFree : State::kUnknown;
+}
+
+FreeSpace::UnknownRun FreeSpace::firstUnknown(const Eigen::Vector3d& origin,
+                                              const Eigen::Vector3d& direction,
+                                              double length) const {
+    const double step = 0.9 * voxel_;
+    UnknownRun run;
+    for (double s = step; s < length; s += step) {
+        const Eigen::Vector3i v = voxelOf(origin + s * direction);
+        if (!inside(v)) {
+            break;
+        }
+        const std::uint8_t voxel = voxels_[index(v)];
+        const bool known = (voxel & (kFreeBit | kKnownBit | kSurfaceBit)) != 0;
+        if (run.begin < 0 && !known && (voxel >> kTryShift) < kTries) {
+            run.begin = s;
+        } else if (run.begin < 0 && ((voxel & kSurfaceBit) != 0 || !known)) {
+            return {};
+        } else if (run.begin >= 0 && known) {
+            break;
+        }
+        run.end = s;
+    }
+    return run;
+}
+
+void FreeSpace::noteTry(const Eigen::Vector3d& point) {
+    const Eigen::Vector3i v = voxelOf(point);
+    if (inside(v) && (voxels_[index(v)] >> kTryShift) < 15) {
+        voxels_[index(v)] = static_cast<std::uint8_t>(voxels_[index(v)] + (1 << kTryShift));
+    }
+}
+
+void FreeSpace::markClear(double clearance, const Eigen::AlignedBox3d& limits) {
+    clear_.assign(voxels_.size(), 0);
+    for (std::size_t i = 0; i < voxels_.size(); ++i) {
+        clear_[i] = passable(voxels_[i]) && limits.contains(centre(coordinates(i))) ? 1 : 0;
+    }
+    // The surface may lie anywhere in a voxel that is not free, and the way between two centres
+    // dips below the clearance of both: one voxel more covers the two.
+    const std::vector<Eigen::Vector3i> offsets = ball(clearance / voxel_ + 1.0);
+    const std::array<Eigen::Vector3i, 6> faces = {
+        Eigen::Vector3i::UnitX(),  -Eigen::Vector3i::UnitX(), Eigen::Vector3i::UnitY(),
+        -Eigen::Vector3i::UnitY(), Eigen::Vector3i::UnitZ(),  -Eigen::Vector3i::UnitZ()};
+    for (std::size_t i = 0; i < voxels_.size(); ++i) {
+        if (passable(voxels_[i])) {
+            continue;
+        }
+        const Eigen::Vector3i v = coordinates(i);
+        const bool border = std::any_of(faces.begin(), faces.end(), [&](const Eigen::Vector3i& f) {
+            return inside(v + f) && passable(voxels_[index(v + f)]);
+        });
+        if (border) {
+            for (const Eigen::Vector3i& o : offsets) {
+                if (inside(v + o)) {
+                    clear_[index(v + o)] = 0;
+                }
+            }
+        }
+    }
+}
+
+void FreeSpace::searchFrom(const Eigen::Vector3i& start) {
+    distance_.assign(voxels_.size(), kFar);
+    parent_.assign(voxels_.size(), kNoParent);
+    struct Step {
+        Eigen::Vector3i offset;
+        float length;
+    };
+    std::vector<Step> steps;
+    for (const Eigen::Vector3i& o : ball(1.8)) {
+        if (o != Eigen::Vector3i::Zero()) {
+            steps.push_back({o, static_cast<float>(o.cast<double>().norm() * voxel_)});
+        }
+    }
+    using Entry = std::pair<float, std::uint32_t>;
+    std::priority_queue<Entry, std::vector<Entry>, std::greater<>> open;
+    const auto first = static_cast<std::uint32_t>(index(start));
+    distance_[first] = 0;
+    open.emplace(0.0F, first);
+    while (!open.empty()) {
+        const auto [d, i] = open.top();
+        open.pop();
+        if (d > distance_[i]) {
+            continue;
+        }
+        const Eigen::Vector3i v = coordinates(i);
+        for (const Step& s : steps) {
+            const Eigen::Vector3i w = v + s.offset;
+            if (!inside(w)) {
+                continue;
+            }
+            const std::size_t j = index(w);
+            if (clear_[j] != 0 && d + s.length < distance_[j]) {
+                distance_[j] = d + s.length;
+                parent_[j] = i;
+                open.emplace(distance_[j], static_cast<std::uint32_t>(j));
+            }
+        }
+    }
+}
+
+void FreeSpace::updateReach(const Eigen::Vector3d& start, double clearance,
+                            const Eigen::AlignedBox3d& limits) {
+    start_ = start;
+    markClear(clearance, limits);
+    const Eigen::Vector3i v = voxelOf(start);
+    if (!inside(v)) {
+        throw std::invalid_argument("free space: the camera is outside of the workspace");
+    }
+    searchFrom(v);  // the camera is there, whatever is known of that voxel
+}
+
+double FreeSpace::distanceTo(const Eigen::Vector3d& point) const {
+    const Eigen::Vector3i v = voxelOf(point);
+    return inside(v) ? static_cast<double>(distance_[index(v)])
+                     : std::numeric_limits<double>::infinity();
+}
+
+bool FreeSpace::segmentClear(const Eigen::Vector3d& a, const Eigen::Vector3d& b) const {
+    const double length = (b - a).norm();
+    const int n = std::max(1, static_cast<int>(std::ceil(length / (0.4 * voxel_))));
+    for (int i = 0; i <= n; ++i) {
+        const Eigen::Vector3i v = voxelOf(a + (b - a) * (static_cast<double>(i) / n));
+        if (!inside(v) || clear_[index(v)] == 0) {
+            return false;
+        }
+    }
+    return true;
+}
+
+std::vector<Eigen::Vector3d> FreeSpace::pathTo(const Eigen::Vector3d& goal) const {
+    if (!std::isfinite(distanceTo(goal))) {
+        return {};
+    }
+    std::vector<Eigen::Vector3d> corners;
+    auto i = static_cast<std::uint32_t>(index(voxelOf(goal)));
+    for (; i != kNoParent; i = parent_[i]) {
+        corners.push_back(centre(coordinates(i)));
+    }
+    corners.back() = start_;
+    std::reverse(corners.begin(), corners.end());
+    std::vector<Eigen::Vector3d> path = {corners.front()};
+    for (std::size_t at = 0; at + 1 < corners.size();) {
+        std::size_t next = at + 1;
+        for (std::size_t far = corners.size() - 1; far > next; --far) {
+            if (segmentClear(corners[at], corners[far])) {
+                next = far;
+                break;
+            }
+        }
+        path.push_back(corners[next]);
+        at = next;
+    }
+    return path;
+}
+
+std::vector<Eigen::Vector3d> FreeSpace::reachable(int stride) const {
+    std::vector<Eigen::Vector3d> places;
+    for (int z = stride / 2; z < size_.z(); z += stride) {
+        for (int y = stride / 2; y < size_.y(); y += stride) {
+            for (int x = stride / 2; x < size_.x(); x += stride) {
+                if (std::isfinite(distance_[index({x, y, z})])) {
+                    places.push_back(centre({x, y, z}));
+                }
+            }
+        }
+    }
+    return places;
+}
+
+}  // namespace riftmap

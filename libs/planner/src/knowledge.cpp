@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "riftmap/planner/view_planner.h"
+
+namespace riftmap {
+
+namespace {
+
+std::optional<Eigen::AlignedBox3d> toBox(const std::vector<double>& v) {
+    if (v.empty()) {
+        return std::nullopt;
+    }
+    if (v.size() != 6 || !(v[0] < v[3] && v[1] < v[4] && v[2] < v[5])) {
+        throw ConfigError(
+            "Planner.surface_box: must be empty or six numbers, the smallest corner first");
+    }
+    return Eigen::AlignedBox3d(Eigen::Vector3d(v[0], v[1], v[2]),
+                               Eigen::Vector3d(v[3], v[4], v[5]));
+}
+
+double cellSizeOf(const PlannerOptions& options, const PixelGraph& graph) {
+    return options.cellSize > 0 ? options.cellSize : 4 * graph.options().targetResolution;
+}
+
+Eigen::AlignedBox3d cameraBoxOf(const PlatformLimits& limits) {
+    Eigen::AlignedBox3d box(limits.boxMin, limits.boxMax);
+    if (limits.kind == PlatformLimits::Kind::kGroundPanTilt) {
+        box.min().z() = std::max(box.min().z(), limits.minHeight);
+        box.max().z() = std::min(box.max().z(), limits.maxHeight);
+    }
+    return box;
+}
+
+/// The camera's box with a margin in which surfaces are looked for.
+Eigen::AlignedBox3d gridBox(const PlatformLimits& limits,
+                            const std::optional<Eigen::AlignedBox3d>& surfaces) {
+    const Eigen::Vector3d margin = Eigen::Vector3d::Constant(limits.clearance + 0.1);
+    Eigen::AlignedBox3d box(limits.boxMin - margin, limits.boxMax + margin);
+    if (surfaces) {
+        box.extend(*surfaces);
+    }
+    return box;
+}
+
+double voxelSizeOf(const PlannerOptions& options, const Eigen::AlignedBox3d& box,
+                   double clearance) {
+    if (options.voxelSize > 0) {
+        return options.voxelSize;
+    }
+    constexpr double kVoxels = 4e5;
+    return std::max(std::cbrt(box.volume() / kVoxels), std::max(0.03, 0.35 * clearance));
+}
+
+}  // namespace
+
+void PlannerOptions::describe(OptionTable& table) {
+    table.section("Planner", "Choice of the next view");
+    table.add("cell_size", cellSize, 0, 10, "m",
+              "Edge of the cells that the map is summed up in for planning; 0 = 4 target "
+              "resolutions");
+    table.add("voxel_size", voxelSize, 0, 10, "m",
+              "Edge of the voxels of the known free space; 0 = by the size of the workspace");
+    table.add("view_cost", viewCost, 0.01, 100, "m", "Cost of taking a view, as length of path");
+    table.add("min_gain", minGain, 0, 1, "",
+              "A view that adds less than this share of the surface known is not worth taking");
+    table.add("max_attempts", maxAttempts, 1, 100, "",
+              "Different views of a tear that may fail before it counts as unobservable");
+    table.add("unknown_weight", unknownWeight, 0, 100, "",
+              "Weight of unknown space looked into against tears to be closed");
+    table.add("clearance_margin", clearanceMargin, 0, 10, "m",
+              "Kept to surfaces beyond the platform's clearance");
+    table.add("targets", targets, 1, 10000, "", "Tears that candidate views are made for, a plan");
+    table.add("places", places, 0, 10000, "", "Places of candidate views that aim at no tear");
+    table.add("surface_box", surfaceBox, 0, "m",
+              "Surfaces lie in this box (xmin ymin zmin xmax ymax zmax) and the space around it is "
+              "free; empty = nothing is known beforehand");
+    table.add("background_is_free", backgroundIsFree,
+              "Pixels without a match show that there is no surface within the range");
+}
+
+Knowledge::Knowledge(const PixelGraph& graph, const PlatformLimits& limits,
+                     const PlannerOptions& options)
+    : graph_(&graph),
+      limits_(limits),
+      options_(options),
+      surfaceBox_(toBox(options.surfaceBox)),
+      cameraBox_(cameraBoxOf(limits)),
+      summary_(cellSizeOf(options, graph)),
+      space_(gridBox(limits, surfaceBox_),
+             voxelSizeOf(options, gridBox(limits, surfaceBox_), limits.clearance)),
+      ledger_(graph.options().targetResolution, options.maxAttempts) {
+    if (surfaceBox_) {
+        space_.declareFreeOutside(*surfaceBox_);
+    }
+}
+
+void Knowledge::update(const View& view) {
+    ++views_;
+    camera_ = view.world_T_camera;
+    sensor_ = SensorModel::of(view, limits_);
+    summary_.update(*graph_, view);
+    ledger_.update(summary_);
+    // The camera is here with its clearance; two voxels more let it take the first step without
+    // having looked straight up and down. Surface that is seen in them counts all the same.
+    space_.declareFree(camera_.translation, limits_.clearance + 2.2 * space_.voxelSize());
+    space_.carve(view, sensor_, options_.backgroundIsFree);
+    std::vector<Eigen::Vector3d> surface;
+    for (const auto& [key, block] : summary_.blocks()) {
+        for (const SurfaceCell& cell : block.cells) {
+            if (cell.vertices >= 3) {
+                surface.push_back(cell.position.cast<double>());
+            }
+        }
+    }
+    space_.setSurface(surface);
+}
+
+void Knowledge::updateReach() {
+    space_.updateReach(camera_.translation, limits_.clearance + options_.clearanceMargin,
+                       cameraBox_);
+}
+
+bool Knowledge::tiltAllowed(const Pose& pose) const {
+    const double tilt = std::asin(std::clamp(pose.rotation(2, 2), -1.0, 1.0));
+    return tilt >= limits_.minTilt - 1e-9 && tilt <= limits_.maxTilt + 1e-9;
+}
+
+std::vector<Pose> Knowledge::pathTo(const Pose& goal) const {
+    const std::vector<Eigen::Vector3d> corners = space_.pathTo(goal.translation);
+    if (corners.empty()) {
+        return {};
+    }
+    double length = 0;
+    for (std::size_t i = 1; i < corners.size(); ++i) {
+        length += (corners[i] - corners[i - 1]).norm();
+    }
+    std::vector<Pose> path;
+    double walked = 0;
+    for (std::size_t i = 1; i + 1 < corners.size(); ++i) {
+        walked += (corners[i] - corners[i - 1]).norm();
+        Pose pose = interpolate(camera_, goal, length > 0 ? walked / length : 1.0);
+        pose.translation = corners[i];
+        path.push_back(pose);
+    }
+    path.push_back(goal);
+    return path;
+}
+
+}  // namespace riftmap

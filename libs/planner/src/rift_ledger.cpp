@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "riftmap/planner/rift_ledger.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace riftmap {
+
+const char* nameOf(RiftState state) {
+    constexpr std::array<const char*, kRiftStates> names = {
+        "open", "deferred", "unreachable", "unobservable", "below_resolution", "resolved"};
+    return names[static_cast<std::size_t>(state)];
+}
+
+RiftLedger::RiftLedger(double resolution, int maxAttempts)
+    : resolution_(resolution), maxAttempts_(maxAttempts) {}
+
+float RiftLedger::tear(const SurfaceCell& cell, double cellSize) const {
+    return cell.rim * static_cast<float>(cellSize) + cell.coarse;
+}
+
+void RiftLedger::updateCell(const SurfaceCell& cell, double cellSize) {
+    const bool torn = cell.open > 0;
+    const bool large = static_cast<double>(cell.rim) >= 1.5 * resolution_ ||
+                       static_cast<double>(cell.coarse) >= 0.15 * cellSize * cellSize;
+    auto it = records_.find(cell.key);
+    if (it == records_.end()) {
+        if (!torn) {
+            return;
+        }
+        it = records_.emplace(cell.key, RiftRecord{}).first;
+    }
+    RiftRecord& r = it->second;
+    if (!torn) {
+        if (r.state != RiftState::kResolved) {
+            r.state = RiftState::kResolved;
+            r.reason = "closed";
+        }
+        return;
+    }
+    r.cell = cell;
+    if (!large) {
+        r.state = RiftState::kBelowResolution;
+        r.reason = "shorter than the asked resolution";
+        return;
+    }
+    const bool givenUp = r.state == RiftState::kUnreachable || r.state == RiftState::kUnobservable;
+    if (!givenUp) {
+        r.state = RiftState::kOpen;
+        r.reason.clear();
+    } else if (r.reconsidered < 2 && cell.vertices > r.verticesThen + r.verticesThen / 3 + 8) {
+        // New surface came up beside it.
+        ++r.reconsidered;
+        r.state = RiftState::kOpen;
+        r.reason.clear();
+        if (!r.attempts.empty()) {
+            r.attempts.erase(r.attempts.begin());
+        }
+    }
+}
+
+void RiftLedger::update(const SurfaceSummary& summary) {
+    for (const std::uint64_t blockKey : summary.changed()) {
+        const auto it = summary.blocks().find(blockKey);
+        if (it != summary.blocks().end()) {
+            for (const SurfaceCell& cell : it->second.cells) {
+                updateCell(cell, summary.cellSize());
+            }
+        }
+    }
+    for (auto& [key, r] : records_) {
+        if (r.state != RiftState::kResolved && summary.find(key) == nullptr) {
+            r.state = RiftState::kResolved;
+            r.reason = "seen through";
+        }
+    }
+}
+
+void RiftLedger::judge(const SurfaceSummary& summary, const std::vector<std::uint64_t>& keys,
+                       const std::vector<float>& before, const Eigen::Vector3d& eye) {
+    constexpr float kHelped = 0.75F;
+    for (std::size_t i = 0; i < keys.size(); ++i) {
+        const auto it = records_.find(keys[i]);
+        if (it == records_.end() || it->second.state != RiftState::kOpen) {
+            continue;
+        }
+        RiftRecord& r = it->second;
+        if (tear(r.cell, summary.cellSize()) <= kHelped * before[i]) {
+            continue;
+        }
+        const Eigen::Vector3f ray = eye.cast<float>() - r.cell.openPosition;
+        r.attempts.push_back({ray.normalized(), ray.norm()});
+        if (static_cast<int>(r.attempts.size()) >= maxAttempts_) {
+            giveUp(keys[i], RiftState::kUnobservable,
+                   std::to_string(r.attempts.size()) + " views of it did not close it");
+        }
+    }
+}
+
+void RiftLedger::giveUp(std::uint64_t key, RiftState state, const std::string& reason) {
+    const auto it = records_.find(key);
+    if (it != records_.end()) {
+        it->second.state = state;
+        it->second.reason = reason;
+        it->second.verticesThen = it->second.cell.vertices;
+    }
+}
+
+void RiftLedger::deferOpen(const std::string& reason) {
+    for (auto& [key, r] : records_) {
+        if (r.state == RiftState::kOpen) {
+            r.state = RiftState::kDeferred;
+            r.reason = reason;
+        }
+    }
+}
+
+std::array<std::size_t, kRiftStates> RiftLedger::counts() const {
+    std::array<std::size_t, kRiftStates> n{};
+    for (const auto& [key, r] : records_) {
+        ++n[static_cast<std::size_t>(r.state)];
+    }
+    return n;
+}
+
+bool RiftLedger::tried(const RiftRecord& record, const Eigen::Vector3d& eye) {
+    const Eigen::Vector3f ray = eye.cast<float>() - record.cell.openPosition;
+    const float distance = ray.norm();
+    return std::any_of(record.attempts.begin(), record.attempts.end(), [&](const Attempt& a) {
+        constexpr float kCosSame = 0.92F;  // 23 degrees
+        return ray.dot(a.direction) > kCosSame * distance && distance > 0.7F * a.distance &&
+               distance < 1.4F * a.distance;
+    });
+}
+
+}  // namespace riftmap

@@ -1,0 +1,359 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "riftmap/planner/view_planner.h"
+
+namespace riftmap {
+
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+struct Candidate {
+    Pose pose;
+    double path = 0;  ///< [m]
+    ViewScore score;
+    double utility = 0;  ///< gain for a metre
+};
+
+Eigen::Vector3d anyPerpendicular(const Eigen::Vector3d& n) {
+    const Eigen::Vector3d axis =
+        std::abs(n.z()) < 0.9 ? Eigen::Vector3d::UnitZ() : Eigen::Vector3d::UnitX();
+    return n.cross(axis).normalized();
+}
+
+/// One plan: makes candidates, scores them, picks.
+class Choice {
+ public:
+    Choice(Knowledge& knowledge, std::vector<Pose>& pool)
+        : k_(knowledge),
+          pool_(pool),
+          scorer_(k_.sensor(), k_.summary(), k_.ledger(), k_.space(), k_.resolution(),
+                  {k_.options().unknownWeight, 2.0}),
+          random_(k_.options().seed * 1000003U + k_.views()),
+          good_(k_.sensor().goodDepth(k_.resolution())) {}
+
+    std::optional<ViewPlan> make();
+
+ private:
+    double uniform(double a, double b) {
+        return a + (b - a) * static_cast<double>(random_()) / 4294967296.0;
+    }
+    bool add(const Eigen::Vector3d& eye, const Eigen::Vector3d& target);
+    void addAround(const RiftRecord& record, int directions);
+    void addTurns();
+    void addPlaces();
+    void addPool();
+    void keepPool();
+    void refine(const Candidate& best);
+    void scoreFrom(std::size_t first);
+    const Candidate* best() const;
+    std::optional<ViewPlan> planFor(const Candidate& candidate) const;
+    std::optional<ViewPlan> lastResorts(double minGain);
+    bool lineOfSight(const Eigen::Vector3d& eye, const Eigen::Vector3d& target) const;
+
+    Knowledge& k_;
+    std::vector<Pose>& pool_;
+    ViewScorer scorer_;
+    std::mt19937 random_;
+    double good_;
+    std::vector<Candidate> candidates_;
+};
+
+/// Adds the view if the camera can get there. The place is moved to the middle of its voxel.
+bool Choice::add(const Eigen::Vector3d& eye, const Eigen::Vector3d& target) {
+    const double path = k_.space().distanceTo(eye);
+    const Eigen::Vector3d place = path == 0.0 ? k_.camera().translation : k_.space().snap(eye);
+    if (!std::isfinite(path) || (target - place).norm() < 1e-6) {
+        return false;
+    }
+    Candidate c;
+    c.pose = k_.sensor().lookingAt(place, target);
+    c.path = path;
+    if (!k_.tiltAllowed(c.pose)) {
+        return false;
+    }
+    candidates_.push_back(std::move(c));
+    return true;
+}
+
+/// Views of a tear: along the normal, over the rim, back across it, and from both sides; near and
+/// from where one view still measures well.
+void Choice::addAround(const RiftRecord& record, int directions) {
+    const Eigen::Vector3d p = record.cell.openPosition.cast<double>();
+    Eigen::Vector3d n = record.cell.normal.cast<double>();
+    if (n.norm() < 0.5) {
+        n = (k_.camera().translation - p).normalized();
+    }
+    Eigen::Vector3d t = record.cell.outward.cast<double>();
+    const bool rim = t.norm() > 0.25;
+    t = rim ? t.normalized() : anyPerpendicular(n);
+    const Eigen::Vector3d side = n.cross(t).normalized();
+    const double turn = uniform(0, 2 * kPi);
+    std::vector<Eigen::Vector3d> ways = {n, n + 0.7 * t, 0.35 * n + t, n - 0.7 * t};
+    ways.push_back(n + 0.8 * (std::cos(turn) * t + std::sin(turn) * side));
+    for (int i = 5; i < directions; ++i) {
+        const double angle = turn + 2.4 * i;
+        const double tilt = std::sqrt((i - 4.0) / (directions - 4.0)) * 1.3;
+        ways.push_back(std::cos(tilt) * n +
+                       std::sin(tilt) * (std::cos(angle) * t + std::sin(angle) * side));
+    }
+    const double least = 1.2 * k_.sensor().nearLimit + 0.02;
+    const double most = std::max(least, good_);
+    for (const Eigen::Vector3d& way : ways) {
+        const Eigen::Vector3d d = way.normalized();
+        for (const double s : {0.12, 0.5, 0.95}) {
+            const double distance =
+                least + (most - least) * std::clamp(s + uniform(-0.1, 0.1), 0.0, 1.0);
+            // The rim need not be in the middle: what is to be found lies beyond it.
+            const Eigen::Vector3d target = p + (rim ? 0.2 : 0.0) * distance * t;
+            add(p + distance * d, target);
+        }
+    }
+}
+
+/// Turning where the camera is costs no way.
+void Choice::addTurns() {
+    const Eigen::Vector3d eye = k_.camera().translation;
+    const double start = uniform(0, kPi / 4);
+    for (int i = 0; i < 8; ++i) {
+        for (const double tilt : {-1.0, -0.35, 0.35, 1.0}) {
+            const double a = start + i * kPi / 4;
+            add(eye, eye + Eigen::Vector3d(std::cos(tilt) * std::cos(a),
+                                           std::cos(tilt) * std::sin(a), std::sin(tilt)));
+        }
+    }
+}
+
+void Choice::addPlaces() {
+    const auto& box = k_.surfaceBox();
+    if (box) {
+        // Around an object: from all sides, at distances from which much of it is in view.
+        const double radius = box->diagonal().norm() / 2;
+        for (int i = 0; i < 3 * k_.options().places; ++i) {
+            const double z = uniform(-1, 1);
+            const double a = uniform(0, 2 * kPi);
+            const double r = std::sqrt(1 - z * z);
+            const double distance =
+                uniform(0.9, 1.3) * std::max(radius, k_.sensor().nearLimit) + uniform(0.0, 0.5);
+            add(box->center() + distance * Eigen::Vector3d(r * std::cos(a), r * std::sin(a), z),
+                box->center() + 0.15 * box->sizes().cwiseProduct(Eigen::Vector3d(
+                                           uniform(-1, 1), uniform(-1, 1), uniform(-1, 1))));
+        }
+        return;
+    }
+    const std::vector<Eigen::Vector3d> all = k_.space().reachable(2);
+    if (all.empty()) {
+        return;
+    }
+    for (int i = 0; i < k_.options().places; ++i) {
+        const Eigen::Vector3d eye = all[random_() % all.size()];
+        const double start = uniform(0, 2 * kPi);
+        for (int j = 0; j < 4; ++j) {
+            const double a = start + j * kPi / 2;
+            const double tilt = uniform(-0.9, 0.9);
+            add(eye, eye + Eigen::Vector3d(std::cos(tilt) * std::cos(a),
+                                           std::cos(tilt) * std::sin(a), std::sin(tilt)));
+        }
+    }
+}
+
+/// Good views of the plans before, that were not taken.
+void Choice::addPool() {
+    for (const Pose& pose : pool_) {
+        Candidate c;
+        c.pose = pose;
+        c.path = k_.space().distanceTo(pose.translation);
+        if (std::isfinite(c.path) && c.path > 0) {
+            candidates_.push_back(std::move(c));
+        }
+    }
+}
+
+void Choice::keepPool() {
+    std::vector<std::size_t> order(candidates_.size());
+    for (std::size_t i = 0; i < order.size(); ++i) {
+        order[i] = i;
+    }
+    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+        return candidates_[a].score.gain > candidates_[b].score.gain;
+    });
+    pool_.clear();
+    for (const std::size_t i : order) {
+        constexpr std::size_t kPool = 64;
+        const Candidate& c = candidates_[i];
+        if (pool_.size() < kPool && c.path > 0 && c.score.gain > 0) {
+            pool_.push_back(c.pose);
+        }
+    }
+}
+
+/// Small changes of the best view.
+void Choice::refine(const Candidate& best) {
+    const Pose pose = best.pose;
+    const double reach = 2.0 * k_.space().voxelSize();
+    const Eigen::Vector3d axis = pose.rotation.col(2);
+    for (int i = 0; i < 24; ++i) {
+        const Eigen::Vector3d shift(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1));
+        const Eigen::Vector3d turn =
+            0.25 * Eigen::Vector3d(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1));
+        const bool stay = best.path == 0.0 || i % 3 == 0;
+        const Eigen::Vector3d eye =
+            stay ? pose.translation : Eigen::Vector3d(pose.translation + reach * shift);
+        Candidate c;
+        c.path = k_.space().distanceTo(eye);
+        const Eigen::Vector3d place =
+            c.path == 0.0 ? k_.camera().translation : k_.space().snap(eye);
+        c.pose = lookAt(place, place + axis + turn);
+        if (std::isfinite(c.path) && k_.tiltAllowed(c.pose)) {
+            candidates_.push_back(std::move(c));
+        }
+    }
+}
+
+void Choice::scoreFrom(std::size_t first) {
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(first, candidates_.size(), 4),
+                      [&](const tbb::blocked_range<std::size_t>& range) {
+                          for (std::size_t i = range.begin(); i < range.end(); ++i) {
+                              Candidate& c = candidates_[i];
+                              c.score = scorer_.score(c.pose);
+                              // What is too near is not measured, and hides what is behind it.
+                              const double gain =
+                                  c.score.gain * std::max(0.0, 1.0 - 2.5 * c.score.nearShare);
+                              c.utility = gain / (k_.options().viewCost + c.path);
+                          }
+                      });
+}
+
+const Candidate* Choice::best() const {
+    const Candidate* best = nullptr;
+    for (const Candidate& c : candidates_) {
+        if (best == nullptr || c.utility > best->utility) {
+            best = &c;
+        }
+    }
+    return best;
+}
+
+std::optional<ViewPlan> Choice::planFor(const Candidate& c) const {
+    ViewPlan plan;
+    plan.path = c.path == 0.0 ? std::vector<Pose>{c.pose} : k_.pathTo(c.pose);
+    plan.gain = c.score.gain;
+    plan.cells = c.score.cells;
+    plan.unknown = scorer_.unknownSeen(c.pose);
+    if (plan.path.empty()) {
+        return std::nullopt;
+    }
+    return plan;
+}
+
+bool Choice::lineOfSight(const Eigen::Vector3d& eye, const Eigen::Vector3d& target) const {
+    const Eigen::Vector3d way = target - eye;
+    const double stop = way.norm() - 2.0 * k_.space().voxelSize();
+    const double step = 0.7 * k_.space().voxelSize();
+    for (double s = step; s < stop; s += step) {
+        if (k_.space().at(eye + way.normalized() * s) == FreeSpace::State::kSurface) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/// No candidate was worth it. Every tear that is left gets candidates of its own, from all sides;
+/// one that even these do not help is given up, with the reason.
+std::optional<ViewPlan> Choice::lastResorts(double minGain) {
+    std::vector<const RiftRecord*> left = scorer_.open();
+    const double cell = k_.summary().cellSize();
+    std::stable_sort(left.begin(), left.end(), [&](const RiftRecord* a, const RiftRecord* b) {
+        return k_.ledger().tear(a->cell, cell) > k_.ledger().tear(b->cell, cell);
+    });
+    for (const RiftRecord* record : left) {
+        if (record->state != RiftState::kOpen) {
+            continue;
+        }
+        candidates_.clear();
+        addAround(*record, 20);
+        const bool reachable = !candidates_.empty();
+        const Eigen::Vector3d p = record->cell.openPosition.cast<double>();
+        std::erase_if(candidates_, [&](const Candidate& c) {
+            return scorer_.quality(*record, c.pose.translation) < 0.05 ||
+                   !lineOfSight(c.pose.translation, p);
+        });
+        const bool visible = !candidates_.empty();
+        if (candidates_.size() > 12) {
+            std::stable_sort(candidates_.begin(), candidates_.end(),
+                             [&](const Candidate& a, const Candidate& b) {
+                                 return scorer_.quality(*record, a.pose.translation) >
+                                        scorer_.quality(*record, b.pose.translation);
+                             });
+            candidates_.resize(12);
+        }
+        scoreFrom(0);
+        std::erase_if(candidates_, [&](const Candidate& c) {
+            return c.score.nearShare > 0.3 || c.score.gain < minGain ||
+                   !std::binary_search(c.score.cells.begin(), c.score.cells.end(),
+                                       record->cell.key);
+        });
+        if (const Candidate* c = best()) {
+            return planFor(*c);
+        }
+        const std::uint64_t key = record->cell.key;
+        if (!reachable) {
+            k_.ledger().giveUp(key, RiftState::kUnreachable,
+                               "no place within the range of it is known to be free");
+        } else if (!visible) {
+            k_.ledger().giveUp(key, RiftState::kUnobservable,
+                               "hidden from every place that can be reached");
+        } else {
+            k_.ledger().giveUp(key, RiftState::kBelowResolution, "too small to be worth a view");
+        }
+    }
+    return std::nullopt;
+}
+
+std::optional<ViewPlan> Choice::make() {
+    const auto& open = scorer_.open();
+    const auto targets = static_cast<std::size_t>(k_.options().targets);
+    const std::size_t stride = std::max<std::size_t>(1, open.size() / targets);
+    for (std::size_t i = random_() % stride; i < open.size(); i += stride) {
+        addAround(*open[i], 5);
+    }
+    addTurns();
+    addPlaces();
+    addPool();
+    scoreFrom(0);
+    const double cell = k_.summary().cellSize();
+    const double known = static_cast<double>(k_.summary().cellCount()) * cell * cell;
+    const double minGain = k_.options().minGain * known;
+    for (int round = 0; round < 2; ++round) {
+        if (const Candidate* b = best()) {
+            const std::size_t first = candidates_.size();
+            refine(Candidate(*b));
+            scoreFrom(first);
+        }
+    }
+    keepPool();
+    std::erase_if(candidates_, [&](const Candidate& c) {
+        return c.score.gain < minGain || c.score.nearShare > 0.3;
+    });
+    if (const Candidate* b = best()) {
+        if (auto plan = planFor(*b)) {
+            return plan;
+        }
+    }
+    return lastResorts(minGain);
+}
+
+}  // namespace
+
+std::optional<ViewPlan> RiftPlanner::next(Knowledge& knowledge) {
+    return Choice(knowledge, pool_).make();
+}
+
+}  // namespace riftmap

@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "riftmap/planner/surface_explorer.h"
+
+#include <chrono>
+#include <utility>
+
+namespace riftmap {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double msSince(Clock::time_point start) {
+    return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+}
+
+}  // namespace
+
+void StopOptions::describe(OptionTable& table) {
+    table.section("Stop", "When a run ends although something is left to see");
+    table.add("max_views", maxViews, 1, 1000000, "", "Views taken at most");
+    table.add("max_metres", maxMetres, 0, 1e9, "m", "Longest path");
+    table.add("max_seconds", maxSeconds, 0, 1e9, "s", "Longest time of running");
+}
+
+SurfaceExplorer::SurfaceExplorer(CameraPlatform& platform, PixelGraph& graph, ViewPlanner& planner,
+                                 const PlannerOptions& options, const StopOptions& stop,
+                                 Build build, Record record, OnStep onStep)
+    : platform_(platform),
+      graph_(graph),
+      planner_(planner),
+      stop_(stop),
+      build_(std::move(build)),
+      record_(std::move(record)),
+      onStep_(std::move(onStep)),
+      knowledge_(graph, platform.limits(), options) {}
+
+bool SurfaceExplorer::limitReached(double seconds) {
+    if (knowledge_.views() >= static_cast<std::size_t>(stop_.maxViews)) {
+        stopReason_ = "max_views";
+    } else if (pathLength_ >= stop_.maxMetres) {
+        stopReason_ = "max_metres";
+    } else if (seconds >= stop_.maxSeconds) {
+        stopReason_ = "max_seconds";
+    }
+    return !stopReason_.empty();
+}
+
+/// Takes the view where the camera is and draws the consequences.
+void SurfaceExplorer::look(const std::optional<ViewPlan>& plan, double planMs) {
+    ExploreStep step;
+    step.view = knowledge_.views();
+    step.planMs = planMs;
+    auto t = Clock::now();
+    StereoObservation observation = platform_.grab();
+    if (record_) {
+        record_(observation);
+    }
+    step.grabMs = msSince(t);
+
+    t = Clock::now();
+    const View view = build_(observation);
+    step.stereoMs = msSince(t);
+
+    t = Clock::now();
+    step.merged = graph_.merge(view);
+    step.mergeMs = msSince(t);
+
+    t = Clock::now();
+    step.riftCount = graph_.rifts().size();
+    step.riftsMs = msSince(t);
+
+    t = Clock::now();
+    std::vector<float> before;
+    if (plan) {
+        for (const std::uint64_t key : plan->cells) {
+            const auto it = knowledge_.ledger().records().find(key);
+            before.push_back(
+                it == knowledge_.ledger().records().end()
+                    ? 0.0F
+                    : knowledge_.ledger().tear(it->second.cell, knowledge_.summary().cellSize()));
+        }
+    }
+    std::vector<Eigen::Vector3d> unknown;
+    if (plan) {
+        unknown = plan->unknown;
+    }
+    knowledge_.update(view);
+    if (plan) {
+        knowledge_.ledger().judge(knowledge_.summary(), plan->cells, before,
+                                  view.world_T_camera.translation);
+        for (const Eigen::Vector3d& place : unknown) {
+            if (knowledge_.space().at(place) == FreeSpace::State::kUnknown) {
+                knowledge_.space().noteTry(place);
+            }
+        }
+        step.gain = plan->gain;
+    }
+    step.knowledgeMs = msSince(t);
+    lastKnowledgeMs_ = step.knowledgeMs;
+    step.input = &view;
+    step.pathLength = pathLength_;
+    step.seconds = clock_();
+    if (onStep_) {
+        onStep_(step, knowledge_);
+    }
+}
+
+std::optional<ViewPlan> SurfaceExplorer::choose(double& planMs) {
+    const auto t = Clock::now();
+    knowledge_.updateReach();
+    auto plan = planner_.next(knowledge_);
+    planMs = msSince(t) + lastKnowledgeMs_;
+    return plan;
+}
+
+/// Moves along the plan's path, at most as far as one step may go.
+void SurfaceExplorer::move(ViewPlan& plan) {
+    const double maxStep = platform_.limits().maxStep;
+    std::vector<Pose> path;
+    Eigen::Vector3d at = platform_.pose().translation;
+    double length = 0;
+    for (const Pose& pose : plan.path) {
+        const double leg = (pose.translation - at).norm();
+        if (length + leg > maxStep) {
+            // As far as it goes; the view from there is taken, and the next plan goes on.
+            Pose last = plan.path.back();
+            last.translation = at + (pose.translation - at) * ((maxStep - length) / leg);
+            path.push_back(last);
+            length = maxStep;
+            plan.cells.clear();
+            plan.unknown.clear();
+            break;
+        }
+        length += leg;
+        path.push_back(pose);
+        at = pose.translation;
+    }
+    platform_.moveAlong(path);
+    pathLength_ += length;
+}
+
+void SurfaceExplorer::run(const std::atomic<bool>& interrupt) {
+    const auto start = Clock::now();
+    clock_ = [start] { return msSince(start) / 1000.0; };
+    look(std::nullopt, 0.0);
+    while (!limitReached(clock_())) {
+        if (interrupt) {
+            stopReason_ = "interrupted";
+            break;
+        }
+        double planMs = 0;
+        std::optional<ViewPlan> plan = choose(planMs);
+        if (!plan) {
+            stopReason_ = "complete";
+            break;
+        }
+        move(*plan);
+        look(plan, planMs);
+    }
+    if (stopReason_ != "complete") {
+        knowledge_.ledger().deferOpen(stopReason_);
+    }
+}
+
+}  // namespace riftmap

@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "riftmap/planner/surface_summary.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <stdexcept>
+
+namespace riftmap {
+
+namespace {
+
+constexpr int kOffset = 1 << 20;  ///< cells from the origin to either side
+
+std::uint64_t pack(const Eigen::Vector3i& v) {
+    const auto part = [](int x) { return static_cast<std::uint64_t>(x + kOffset) & 0x1FFFFFU; };
+    return part(v.z()) << 42 | part(v.y()) << 21 | part(v.x());
+}
+
+Eigen::Vector3i unpack(std::uint64_t key) {
+    const auto part = [&](int shift) {
+        return static_cast<int>(key >> shift & 0x1FFFFFU) - kOffset;
+    };
+    return {part(0), part(21), part(42)};
+}
+
+/// Sums while the vertices of a block go by.
+struct Sums {
+    Eigen::Vector3d position = Eigen::Vector3d::Zero(), normal = Eigen::Vector3d::Zero();
+    Eigen::Vector3d openPosition = Eigen::Vector3d::Zero(), outward = Eigen::Vector3d::Zero();
+    std::uint32_t vertices = 0, torn = 0, coarse = 0, open = 0, high = 0;
+    std::uint8_t kinds = 0;
+};
+
+/// From the neighbours towards the vertex and on: out of the surface seen so far.
+Eigen::Vector3d outwardAt(const PixelGraph& graph, VertexId id, const Vertex& v,
+                          std::uint32_t& high) {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    graph.forEachEdge(id, [&](VertexId to, float weight) {
+        if (graph.isHigh(id, to, weight)) {
+            ++high;
+        } else {
+            sum += (v.position - graph.position(to)).cast<double>().normalized();
+        }
+    });
+    const Eigen::Vector3d n = v.normal.cast<double>();
+    sum -= n * n.dot(sum);
+    const double length = sum.norm();
+    return length > 1.0 ? Eigen::Vector3d(sum / length) : sum;
+}
+
+SurfaceCell toCell(const Sums& s, std::uint64_t key, double cell) {
+    SurfaceCell c;
+    c.key = key;
+    c.vertices = s.vertices;
+    c.open = s.open;
+    c.highEdges = s.high;
+    c.kinds = s.kinds;
+    c.position = (s.position / s.vertices).cast<float>();
+    if (s.normal.norm() > 1e-6) {
+        c.normal = s.normal.normalized().cast<float>();
+    }
+    // A sheet across the cell holds about (cell / spacing)^2 vertices.
+    const double spacing = cell / std::sqrt(static_cast<double>(s.vertices));
+    if (s.open > 0) {
+        c.openPosition = (s.openPosition / s.open).cast<float>();
+        c.rim = static_cast<float>(std::min(s.torn * spacing, 2.0 * cell));
+        c.coarse = static_cast<float>(cell * cell * s.coarse / s.vertices);
+    }
+    if (s.torn > 0) {
+        c.outward = (s.outward / s.torn).cast<float>();
+    }
+    return c;
+}
+
+}  // namespace
+
+SurfaceSummary::SurfaceSummary(double cell) : cell_(cell) {
+    if (!(cell > 0)) {
+        throw std::invalid_argument("surface summary: the cell size must be positive");
+    }
+}
+
+std::uint64_t SurfaceSummary::keyOf(const Eigen::Vector3d& point) const {
+    return pack((point / cell_).array().floor().cast<int>());
+}
+
+const SurfaceCell* SurfaceSummary::find(std::uint64_t key) const {
+    const Eigen::Vector3i block =
+        unpack(key).unaryExpr([](int x) { return static_cast<int>(std::floor(x / 8.0)); });
+    const auto it = blocks_.find(pack(block));
+    if (it == blocks_.end()) {
+        return nullptr;
+    }
+    const auto& cells = it->second.cells;
+    const auto c =
+        std::lower_bound(cells.begin(), cells.end(), key,
+                         [](const SurfaceCell& a, std::uint64_t k) { return a.key < k; });
+    return c != cells.end() && c->key == key ? &*c : nullptr;
+}
+
+std::size_t SurfaceSummary::cellCount() const {
+    std::size_t n = 0;
+    for (const auto& [key, block] : blocks_) {
+        n += block.cells.size();
+    }
+    return n;
+}
+
+void SurfaceSummary::update(const PixelGraph& graph, const View& view) {
+    const double side = kCellsPerSide * cell_;
+    const auto blockAt = [&](const Eigen::Vector3d& p) {
+        return pack((p / side).array().floor().cast<int>());
+    };
+    changed_.clear();
+    const DisparityImage& d = view.disparity;
+    std::uint64_t last = ~std::uint64_t{0};
+    for (int row = 0; row < d.height; row += 2) {
+        for (int column = 0; column < d.width; column += 2) {
+            if (d.valid(column, row)) {
+                const Eigen::Vector3d p =
+                    view.world_T_camera *
+                    view.camera.backProject(column, row, static_cast<double>(d.at(column, row)));
+                const std::uint64_t key = blockAt(p);
+                if (key != last) {
+                    changed_.push_back(key);
+                    last = key;
+                }
+            }
+        }
+    }
+    // Blocks that the view may have seen through lose vertices without gaining any.
+    const Pose camera_T_world = view.world_T_camera.inverse();
+    for (const auto& [key, block] : blocks_) {
+        const Eigen::Vector3d p = camera_T_world * Eigen::Vector3d(block.box.center());
+        if (p.z() < 0.1) {
+            continue;
+        }
+        const Eigen::Vector2d uv = view.camera.project(p);
+        const double radius = view.camera.fx * block.box.diagonal().norm() / 2 / p.z();
+        bool through = false;
+        for (const double du : {-0.6, 0.0, 0.6}) {
+            for (const double dv : {-0.6, 0.0, 0.6}) {
+                const auto column = static_cast<int>(std::lround(uv.x() + du * radius));
+                const auto row = static_cast<int>(std::lround(uv.y() + dv * radius));
+                through =
+                    through || (column >= 0 && row >= 0 && column < d.width && row < d.height &&
+                                d.valid(column, row) &&
+                                view.camera.depth(static_cast<double>(d.at(column, row))) > p.z());
+            }
+        }
+        if (through) {
+            changed_.push_back(key);
+        }
+    }
+    std::sort(changed_.begin(), changed_.end());
+    changed_.erase(std::unique(changed_.begin(), changed_.end()), changed_.end());
+    std::vector<Block> rebuilt(changed_.size());
+    tbb::parallel_for(std::size_t{0}, changed_.size(),
+                      [&](std::size_t i) { rebuilt[i] = build(graph, changed_[i]); });
+    for (std::size_t i = 0; i < changed_.size(); ++i) {
+        if (rebuilt[i].cells.empty()) {
+            blocks_.erase(changed_[i]);
+        } else {
+            blocks_[changed_[i]] = std::move(rebuilt[i]);
+        }
+    }
+}
+
+SurfaceSummary::Block SurfaceSummary::build(const PixelGraph& graph, std::uint64_t blockKey) const {
+    constexpr int n = kCellsPerSide;
+    const Eigen::Vector3i corner = unpack(blockKey) * n;
+    const Eigen::Vector3d min = corner.cast<double>() * cell_;
+    const Eigen::Vector3d max = min + Eigen::Vector3d::Constant(n * cell_);
+    std::vector<Sums> sums(n * n * n);
+    graph.forEachVertexIn(min.cast<float>(), max.cast<float>(), [&](VertexId id) {
+        const Vertex v = graph.vertex(id);
+        const Eigen::Vector3d p = v.position.cast<double>();
+        const Eigen::Vector3i at = (p / cell_).array().floor().cast<int>().matrix() - corner;
+        if ((at.array() < 0).any() || (at.array() >= n).any()) {
+            return;  // on the outer face: belongs to the next block
+        }
+        Sums& s = sums[static_cast<std::size_t>((at.z() * n + at.y()) * n + at.x())];
+        ++s.vertices;
+        s.position += p;
+        s.normal += v.normal.cast<double>();
+        if (v.open == 0) {
+            return;
+        }
+        ++s.open;
+        s.kinds |= v.open;
+        s.openPosition += p;
+        if ((v.open & ~kTooCoarse) != 0) {
+            ++s.torn;
+            s.outward += outwardAt(graph, id, v, s.high);
+        } else {
+            ++s.coarse;
+        }
+    });
+    Block block;
+    block.box = Eigen::AlignedBox3d(min, max);
+    for (int z = 0; z < n; ++z) {
+        for (int y = 0; y < n; ++y) {
+            for (int x = 0; x < n; ++x) {
+                const Sums& s = sums[static_cast<std::size_t>((z * n + y) * n + x)];
+                if (s.vertices > 0) {
+                    block.cells.push_back(
+                        toCell(s, pack(corner + Eigen::Vector3i(x, y, z)), cell_));
+                }
+            }
+        }
+    }
+    return block;
+}
+
+}  // namespace riftmap

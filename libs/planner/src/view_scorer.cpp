@@ -1,0 +1,221 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "riftmap/planner/view_scorer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace riftmap {
+
+namespace {
+
+constexpr int kPixels = 12;  ///< of the image to one of the depth buffer, along each axis
+constexpr int kRayStride = 2;
+constexpr float kFar = std::numeric_limits<float>::infinity();
+
+}  // namespace
+
+struct ViewScorer::DepthBuffer {
+    int width, height;
+    float fx, fy, cx, cy;  ///< [px of the buffer]
+    std::vector<float> depth;
+
+    float& at(int column, int row) {
+        return depth[static_cast<std::size_t>(row) * static_cast<std::size_t>(width) +
+                     static_cast<std::size_t>(column)];
+    }
+    float at(int column, int row) const {
+        return depth[static_cast<std::size_t>(row) * static_cast<std::size_t>(width) +
+                     static_cast<std::size_t>(column)];
+    }
+};
+
+ViewScorer::ViewScorer(const SensorModel& sensor, const SurfaceSummary& summary,
+                       const RiftLedger& ledger, const FreeSpace& space, double resolution,
+                       const Weights& weights)
+    : sensor_(sensor),
+      summary_(&summary),
+      ledger_(&ledger),
+      space_(&space),
+      weights_(weights),
+      goodDepth_(sensor.goodDepth(resolution)) {
+    for (const auto& [key, block] : summary.blocks()) {
+        BlockView b{block.box.center().cast<float>(),
+                    static_cast<float>(block.box.diagonal().norm() / 2), &block, open_.size(), 0};
+        for (const SurfaceCell& cell : block.cells) {
+            if (cell.open == 0) {
+                continue;
+            }
+            const auto it = ledger.records().find(cell.key);
+            if (it != ledger.records().end() && it->second.state == RiftState::kOpen) {
+                open_.push_back(&it->second);
+            }
+        }
+        b.lastOpen = open_.size();
+        blocks_.push_back(b);
+    }
+}
+
+double ViewScorer::quality(const RiftRecord& record, const Eigen::Vector3d& eye) const {
+    if (RiftLedger::tried(record, eye)) {
+        return 0.0;
+    }
+    const Eigen::Vector3d ray = eye - record.cell.openPosition.cast<double>();
+    const double distance = ray.norm();
+    const Eigen::Vector3d n = record.cell.normal.cast<double>();
+    // At a silhouette the surface bends away over the rim: what is to be seen faces outwards too.
+    Eigen::Vector3d facing = n;
+    if ((record.cell.kinds & kDepthStep) != 0) {
+        facing = n + 0.7 * record.cell.outward.cast<double>();
+    }
+    double angle = 0.6;  // where no normal is known, any side may do
+    if (facing.norm() > 1e-3) {
+        angle = ray.dot(facing.normalized()) / distance;
+    }
+    const double angleQuality = std::clamp((angle - 0.2) / 0.35, 0.0, 1.0);
+    const double depthQuality = distance <= goodDepth_ ? 1.0 : std::pow(goodDepth_ / distance, 2);
+    return angleQuality * depthQuality * std::pow(0.6, record.attempts.size());
+}
+
+ViewScorer::DepthBuffer ViewScorer::draw(const Pose& camera_T_world,
+                                         std::vector<const BlockView*>& seen) const {
+    const StereoCamera& c = sensor_.camera;
+    DepthBuffer b;
+    b.width = std::max(1, c.width / kPixels);
+    b.height = std::max(1, c.height / kPixels);
+    b.fx = static_cast<float>(c.fx / kPixels);
+    b.fy = static_cast<float>(c.fy / kPixels);
+    b.cx = static_cast<float>((c.cx + 0.5) / kPixels - 0.5);
+    b.cy = static_cast<float>((c.cy + 0.5) / kPixels - 0.5);
+    b.depth.assign(static_cast<std::size_t>(b.width) * static_cast<std::size_t>(b.height), kFar);
+    const Eigen::Matrix3f rotation = camera_T_world.rotation.cast<float>();
+    const Eigen::Vector3f translation = camera_T_world.translation.cast<float>();
+    const float half = 0.6F * static_cast<float>(summary_->cellSize());
+    const auto farLimit = static_cast<float>(sensor_.farLimit);
+    for (const BlockView& block : blocks_) {
+        const Eigen::Vector3f m = rotation * block.centre + translation;
+        const float z = std::max(m.z(), 0.05F);
+        const float spread = b.fx * block.radius / z;
+        const float u = b.fx * m.x() / z + b.cx;
+        const float v = b.fy * m.y() / z + b.cy;
+        if (m.z() < -block.radius || m.z() > farLimit + block.radius ||
+            (m.z() > block.radius &&
+             (u < -spread || v < -spread || u > static_cast<float>(b.width) + spread ||
+              v > static_cast<float>(b.height) + spread))) {
+            continue;
+        }
+        seen.push_back(&block);
+        for (const SurfaceCell& cell : block.block->cells) {
+            const Eigen::Vector3f p = rotation * cell.position + translation;
+            if (p.z() < 0.05F || p.z() > farLimit) {
+                continue;
+            }
+            const float r = b.fx * half / p.z();
+            const float pu = b.fx * p.x() / p.z() + b.cx;
+            const float pv = b.fy * p.y() / p.z() + b.cy;
+            const int c0 = std::max(0, static_cast<int>(std::lround(pu - r)));
+            const int c1 = std::min(b.width - 1, static_cast<int>(std::lround(pu + r)));
+            const int r0 = std::max(0, static_cast<int>(std::lround(pv - r)));
+            const int r1 = std::min(b.height - 1, static_cast<int>(std::lround(pv + r)));
+            for (int row = r0; row <= r1; ++row) {
+                for (int column = c0; column <= c1; ++column) {
+                    float& d = b.at(column, row);
+                    d = std::min(d, p.z());
+                }
+            }
+        }
+    }
+    return b;
+}
+
+template <class F>
+void ViewScorer::forEachUnknown(const Pose& world_T_camera, const DepthBuffer& b,
+                                const F& f) const {
+    for (int row = 0; row < b.height; row += kRayStride) {
+        for (int column = sensor_.firstColumn / kPixels; column < b.width; column += kRayStride) {
+            const Eigen::Vector3d inCamera(
+                static_cast<double>((static_cast<float>(column) - b.cx) / b.fx),
+                static_cast<double>((static_cast<float>(row) - b.cy) / b.fy), 1.0);
+            const double norm = inCamera.norm();
+            const double depth = std::min(static_cast<double>(b.at(column, row)), sensor_.farLimit);
+            const Eigen::Vector3d direction = world_T_camera.rotation * (inCamera / norm);
+            const FreeSpace::UnknownRun run =
+                space_->firstUnknown(world_T_camera.translation, direction, depth * norm);
+            if (run.begin > 0) {
+                // The surface may be anywhere in it.
+                f(Eigen::Vector3d(world_T_camera.translation + run.begin * direction),
+                  (run.begin + run.end) / (2 * norm));
+            }
+        }
+    }
+}
+
+ViewScore ViewScorer::score(const Pose& world_T_camera) const {
+    ViewScore result;
+    const Pose camera_T_world = world_T_camera.inverse();
+    std::vector<const BlockView*> seen;
+    const DepthBuffer buffer = draw(camera_T_world, seen);
+    const int firstColumn = sensor_.firstColumn / kPixels;
+    int nearPixels = 0;
+    for (int row = 0; row < buffer.height; ++row) {
+        for (int column = firstColumn; column < buffer.width; ++column) {
+            nearPixels += static_cast<double>(buffer.at(column, row)) < sensor_.nearLimit ? 1 : 0;
+        }
+    }
+    result.nearShare =
+        static_cast<double>(nearPixels) / ((buffer.width - firstColumn) * buffer.height);
+
+    const StereoCamera& camera = sensor_.camera;
+    const double cell = summary_->cellSize();
+    constexpr double kMargin = 6;  // [px] a tear at the very border of the image stays torn
+    for (const BlockView* block : seen) {
+        for (std::size_t i = block->firstOpen; i < block->lastOpen; ++i) {
+            const RiftRecord& record = *open_[i];
+            const Eigen::Vector3d world = record.cell.openPosition.cast<double>();
+            const Eigen::Vector3d p = camera_T_world * world;
+            if (p.z() < 1.02 * sensor_.nearLimit || p.z() < 0.05 || p.z() > sensor_.farLimit) {
+                continue;
+            }
+            const Eigen::Vector2d uv = camera.project(p);
+            if (uv.x() < sensor_.firstColumn + kMargin || uv.x() > camera.width - 1 - kMargin ||
+                uv.y() < kMargin || uv.y() > camera.height - 1 - kMargin) {
+                continue;
+            }
+            const double q = quality(record, world_T_camera.translation);
+            if (q <= 0) {
+                continue;
+            }
+            const int column = std::clamp(static_cast<int>(uv.x()) / kPixels, 0, buffer.width - 1);
+            const int row = std::clamp(static_cast<int>(uv.y()) / kPixels, 0, buffer.height - 1);
+            if (static_cast<double>(buffer.at(column, row)) < p.z() - 2.0 * cell) {
+                continue;
+            }
+            const double area = static_cast<double>(record.cell.rim) * weights_.reach * cell +
+                                static_cast<double>(record.cell.coarse);
+            result.openGain += q * area;
+            if (q > 0.3) {
+                result.cells.push_back(record.cell.key);
+            }
+        }
+    }
+    std::sort(result.cells.begin(), result.cells.end());
+    const double side = static_cast<double>(kPixels * kRayStride) / camera.fx;
+    forEachUnknown(world_T_camera, buffer, [&](const Eigen::Vector3d&, double depth) {
+        const double z = std::min(depth, goodDepth_);
+        result.unknownGain += side * side * z * z;
+    });
+    result.unknownGain *= weights_.unknown;
+    result.gain = result.openGain + result.unknownGain;
+    return result;
+}
+
+std::vector<Eigen::Vector3d> ViewScorer::unknownSeen(const Pose& world_T_camera) const {
+    std::vector<const BlockView*> seen;
+    const DepthBuffer buffer = draw(world_T_camera.inverse(), seen);
+    std::vector<Eigen::Vector3d> places;
+    forEachUnknown(world_T_camera, buffer,
+                   [&](const Eigen::Vector3d& p, double) { places.push_back(p); });
+    return places;
+}
+
+}  // namespace riftmap

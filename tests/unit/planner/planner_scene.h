@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Views of simple surfaces with exact depth.
+#pragma once
+
+#include <functional>
+#include <optional>
+
+#include "riftmap/core/view.h"
+
+namespace riftmap::test {
+
+inline StereoCamera smallCamera() {
+    StereoCamera camera;
+    camera.width = 256;
+    camera.height = 192;
+    camera.fx = camera.fy = 210;
+    camera.cx = 127.5;
+    camera.cy = 95.5;
+    camera.baseline = 0.12;
+    return camera;
+}
+
+/// `depthAlong(origin, direction)`: distance in lengths of the direction to the surface, if any.
+inline View viewOf(const Pose& pose,
+                   const std::function<std::optional<double>(
+                       const Eigen::Vector3d&, const Eigen::Vector3d&)>& depthAlong,
+                   int firstColumn = 0) {
+    View view;
+    view.camera = smallCamera();
+    view.world_T_camera = pose;
+    view.disparity.resize(view.camera.width, view.camera.height);
+    view.disparity.firstColumn = firstColumn;
+    view.image = cv::Mat(view.camera.height, view.camera.width, CV_8UC1, cv::Scalar(128));
+    for (int row = 0; row < view.camera.height; ++row) {
+        for (int column = firstColumn; column < view.camera.width; ++column) {
+            const Eigen::Vector3d ray((column - view.camera.cx) / view.camera.fx,
+                                      (row - view.camera.cy) / view.camera.fy, 1.0);
+            if (const auto z = depthAlong(pose.translation, pose.rotation * ray)) {
+                const std::size_t i = view.disparity.index(column, row);
+                view.disparity.disparity[i] = static_cast<float>(view.camera.disparity(*z));
+                view.disparity.sigma[i] = 0.05F;
+            }
+        }
+    }
+    return view;
+}
+
+/// The wall x = `at`, seen from smaller x.
+inline std::function<std::optional<double>(const Eigen::Vector3d&, const Eigen::Vector3d&)> wall(
+    double at) {
+    return [at](const Eigen::Vector3d& origin,
+                const Eigen::Vector3d& direction) -> std::optional<double> {
+        if (direction.x() < 1e-9) {
+            return std::nullopt;
+        }
+        return (at - origin.x()) / direction.x();
+    };
+}
+
+}  // namespace riftmap::test

@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "riftmap/planner/rift_ledger.h"
+
+#include <gtest/gtest.h>
+
+#include "planner_scene.h"
+#include "riftmap/planner/view_scorer.h"
+
+namespace riftmap {
+namespace {
+
+/// A wall seen once: its rim is one long tear.
+class LedgerOnWall : public testing::Test {
+ protected:
+    void SetUp() override { see(lookAt({0, 0, 0}, {1, 0, 0})); }
+
+    void see(const Pose& pose) {
+        const View view = test::viewOf(pose, test::wall(2.0));
+        graph.merge(view);
+        summary.update(graph, view);
+        ledger.update(summary);
+    }
+    std::uint64_t anyOpen() const {
+        for (const auto& [key, record] : ledger.records()) {
+            if (record.state == RiftState::kOpen) {
+                return key;
+            }
+        }
+        return 0;
+    }
+
+    static GraphOptions options() {
+        GraphOptions o;
+        o.targetResolution = 0.05;
+        return o;
+    }
+    PixelGraph graph{options()};
+    SurfaceSummary summary{0.2};
+    RiftLedger ledger{0.05, 3};
+};
+
+TEST_F(LedgerOnWall, theRimIsOpenAndTheMiddleIsNot) {
+    EXPECT_GT(ledger.counts()[static_cast<std::size_t>(RiftState::kOpen)], 20U);
+    for (const auto& [key, record] : ledger.records()) {
+        const Eigen::Vector3f p = record.cell.openPosition;
+        EXPECT_TRUE(std::abs(p.y()) > 0.9F || std::abs(p.z()) > 0.7F) << p.transpose();
+        if (record.state == RiftState::kOpen) {  // the rim points outwards
+            EXPECT_GT(record.cell.outward.dot(Eigen::Vector3f(0, p.y(), p.z())), 0.0F);
+        }
+    }
+}
+
+TEST_F(LedgerOnWall, aTearThatIsClosedIsResolved) {
+    see(lookAt({0, 1, 0}, {1, 1, 0}));  // a metre to the left: its left rim is inside now
+    std::size_t resolved = 0;
+    for (const auto& [key, record] : ledger.records()) {
+        const Eigen::Vector3f p = record.cell.openPosition;
+        if (record.state == RiftState::kResolved) {
+            EXPECT_GT(std::abs(p.y()), 0.0F);
+            ++resolved;
+        }
+    }
+    EXPECT_GT(resolved, 3U);
+}
+
+TEST_F(LedgerOnWall, vainTriesAreNotRepeatedAndEndTheTear) {
+    const std::uint64_t key = anyOpen();
+    const RiftRecord& record = ledger.records().at(key);
+    const float before = ledger.tear(record.cell, summary.cellSize());
+    const Eigen::Vector3d p = record.cell.openPosition.cast<double>();
+    const Eigen::Vector3d eye = p + Eigen::Vector3d(-1, 0, 0);
+    EXPECT_FALSE(RiftLedger::tried(record, eye));
+    ledger.judge(summary, {key}, {before}, eye);
+    EXPECT_TRUE(RiftLedger::tried(record, eye));
+    EXPECT_TRUE(RiftLedger::tried(record, eye + Eigen::Vector3d(0, 0.1, 0)));
+    EXPECT_FALSE(RiftLedger::tried(record, p + Eigen::Vector3d(-1, 1, 0)));  // another side
+    EXPECT_FALSE(RiftLedger::tried(record, p + Eigen::Vector3d(-0.4, 0, 0)));  // nearer
+    ledger.judge(summary, {key}, {before}, p + Eigen::Vector3d(-1, 1, 0));
+    EXPECT_EQ(record.state, RiftState::kOpen);
+    ledger.judge(summary, {key}, {before}, p + Eigen::Vector3d(-1, -1, 0));
+    EXPECT_EQ(record.state, RiftState::kUnobservable);
+    EXPECT_EQ(record.attempts.size(), 3U);
+    EXPECT_FALSE(record.reason.empty());
+}
+
+TEST_F(LedgerOnWall, aTryThatHelpedIsNoAttempt) {
+    const std::uint64_t key = anyOpen();
+    const float tear = ledger.tear(ledger.records().at(key).cell, summary.cellSize());
+    ledger.judge(summary, {key}, {4 * tear}, {0, 0, 0});
+    EXPECT_TRUE(ledger.records().at(key).attempts.empty());
+}
+
+TEST_F(LedgerOnWall, whatIsOpenAtTheEndIsDeferred) {
+    ledger.deferOpen("max_views");
+    EXPECT_EQ(ledger.counts()[static_cast<std::size_t>(RiftState::kOpen)], 0U);
+    EXPECT_GT(ledger.counts()[static_cast<std::size_t>(RiftState::kDeferred)], 0U);
+}
+
+TEST_F(LedgerOnWall, viewsOverTheRimPromiseMoreThanTheOneTaken) {
+    FreeSpace space(Eigen::AlignedBox3d(Eigen::Vector3d(-1, -4, -4), Eigen::Vector3d(3, 4, 4)), 0.1);
+    const View view = test::viewOf(lookAt({0, 0, 0}, {1, 0, 0}), test::wall(2.0));
+    PlatformLimits limits;
+    limits.farLimit = 6;
+    const SensorModel sensor = SensorModel::of(view, limits);
+    space.carve(view, sensor, false);
+    const ViewScorer scorer(sensor, summary, ledger, space, 0.05, {0.5, 2.0});
+    const ViewScore same = scorer.score(lookAt({0, 0, 0}, {1, 0, 0}));
+    const ViewScore beyond = scorer.score(lookAt({0, 1.2, 0}, {1, 1.2, 0}));
+    EXPECT_GT(beyond.openGain, 2 * same.openGain);
+    EXPECT_FALSE(beyond.cells.empty());
+    const ViewScore away = scorer.score(lookAt({0, 0, 0}, {-1, 0, 0}));
+    EXPECT_EQ(away.openGain, 0.0);
+    const ViewScore tooNear = scorer.score(lookAt({1.9, 0, 0}, {3, 0, 0}));
+    EXPECT_EQ(tooNear.openGain, 0.0);
+}
+
+}  // namespace
+}  // namespace riftmap
