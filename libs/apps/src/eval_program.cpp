@@ -142,9 +142,7 @@ void JudgeOptions::describe(OptionTable& table) {
 EvalProgram::EvalProgram()
     : Program("riftmap-eval",
               "Judges a map against the world it is of: coverage, accuracy, OctoMap cross-check.",
-              Config::kOptional) {
-    eval_.cache = (fs::temp_directory_path() / "riftmap-observable").string();
-}
+              Config::kOptional) {}
 EvalProgram::~EvalProgram() = default;
 
 void EvalProgram::describe(OptionTable& table) {
@@ -236,6 +234,16 @@ void EvalProgram::run() {
     }
     const Map map = readMap();
     const SimulatedPlatform platform(simulation_, seed());
+    std::vector<fs::path> inputs{map_};
+    if (!simulation_.world.mesh.empty()) {
+        inputs.emplace_back(simulation_.world.mesh);
+    }
+    const RunDirectory directory = makeRunDirectory(inputs);
+    if (eval_.cache.empty()) {
+        eval_.cache = (fs::temp_directory_path() / "riftmap-observable").string();
+    } else if (eval_.cache == "none") {
+        eval_.cache.clear();
+    }
     const CoverageJudge judge(
         platform.world().mesh, platform.rayCaster(),
         viewSpaceOf(platform.limits(), platform.camera(), platform.pose().translation), eval_);
@@ -245,7 +253,7 @@ void EvalProgram::run() {
     if (!rawlog_.empty()) {
         check(map, judge);
     }
-    write(map, judge, platform);
+    write(map, judge, platform, directory);
     print();
 }
 
@@ -269,18 +277,7 @@ void EvalProgram::check(const Map& map, const CoverageJudge& judge) {
 }
 
 void EvalProgram::write(const Map& map, const CoverageJudge& judge,
-                        const SimulatedPlatform& platform) {
-    RunInfo info;
-    info.program = name();
-    info.command = commandText();
-    info.config = table().dump();
-    info.seed = seed();
-    info.threads = threads();
-    info.inputs = {map_};
-    if (!simulation_.world.mesh.empty()) {
-        info.inputs.emplace_back(simulation_.world.mesh);
-    }
-    const RunDirectory directory(requiredOut(), info, overwrite());
+                        const SimulatedPlatform& platform, const RunDirectory& directory) {
     YamlMap summary;
     summary.set("world", platform.world().name);
     char hash[32];

@@ -27,7 +27,10 @@ void EvalOptions::describe(OptionTable& table) {
               "clearance, within 2 and 10 cm.");
     table.add("directions", directions, 16, 65536, "",
               "Lines of sight a sample is tried along before it is called unobservable.");
-    table.add("cache", cache, "Directory that keeps observable sets between runs; empty: none.");
+    table.add(
+        "cache", cache,
+        "Directory that keeps observable sets between runs; none: no such; empty: one among the "
+        "temporary files.");
     table.add("strict", strict, "Also coverage of the side seen, with nothing in between.");
 }
 

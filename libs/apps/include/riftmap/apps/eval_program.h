@@ -47,7 +47,8 @@ class EvalProgram : public Program {
     Map readMap() const;
     std::vector<Eigen::Vector3f> readRifts(const std::filesystem::path& file) const;
     void check(const Map& map, const CoverageJudge& judge);
-    void write(const Map& map, const CoverageJudge& judge, const SimulatedPlatform& platform);
+    void write(const Map& map, const CoverageJudge& judge, const SimulatedPlatform& platform,
+               const RunDirectory& directory);
     void print() const;
 
     SimulationOptions simulation_;

@@ -28,8 +28,8 @@ struct EvalOptions {
     double maxIncidence = 1.3089969389957472;  ///< [rad] (75 degrees)
     double grid = 0;        ///< spacing of the camera positions [m]; 0 = by the clearance
     int directions = 1024;  ///< cast from a sample before it is called unobservable
-    std::string cache;      ///< directory for observable sets; empty = none
-    bool strict = true;     ///< strict coverage too (needs normals)
+    std::string cache;  ///< directory for observable sets; empty = none (programs: a temporary one)
+    bool strict = true;  ///< strict coverage too (needs normals)
     void describe(OptionTable& table);
 };
 
