@@ -84,7 +84,7 @@ CoveragePictures::CoveragePictures(const CoverageJudge& judge, const TriangleMes
     building_ = kind == WorldKind::kIndoor;
     const double spacing =
         std::sqrt(judge.meshArea() / static_cast<double>(judge.samples().points.size()));
-    reach_ = static_cast<float>(6 * spacing);
+    reach_ = static_cast<float>(4 * spacing);
     samples_ = PointIndex(judge.samples().points, static_cast<float>(2 * spacing));
     map_ = PointIndex(vertices, static_cast<float>(judge.headline()));
     const Bounds box = bounds(mesh);
@@ -116,6 +116,21 @@ CoveragePictures::CoveragePictures(const CoverageJudge& judge, const TriangleMes
     }
 }
 
+std::optional<std::uint32_t> CoveragePictures::sampleOf(const Eigen::Vector3f& point,
+                                                        const Eigen::Vector3f& normal) const {
+    std::optional<std::uint32_t> best;
+    float least = reach_ * reach_;
+    samples_.anyWithin(point, reach_, [&](std::uint32_t i, float d2) {
+        // Not one of the other side of a thin board.
+        if (d2 <= least && judge_.samples().normals[i].dot(normal) > 0.5F) {
+            least = d2;
+            best = i;
+        }
+        return false;
+    });
+    return best;
+}
+
 CoveragePictures::Seen CoveragePictures::look(const Eye& eye, double column, double row, int width,
                                               int height) const {
     const double f = eye.focal * width;
@@ -132,13 +147,11 @@ CoveragePictures::Seen CoveragePictures::look(const Eye& eye, double column, dou
         }
         depth += hit->t;
         const Eigen::Vector3d point = origin + hit->t * direction;
-        const auto sample = samples_.nearest(point.cast<float>(), reach_);
-        const bool observable = sample && judge_.observable().observable[sample->index] != 0;
         Eigen::Vector3d normal = hit->normal;
-        if (observable &&
-            normal.dot(judge_.observable().normals[sample->index].cast<double>()) < 0 &&
-            std::abs(normal.dot(judge_.samples().normals[sample->index].cast<double>())) > 0.9) {
-            normal = -normal;
+        const auto sample = sampleOf(point.cast<float>(), normal.cast<float>());
+        const bool observable = sample && judge_.observable().observable[*sample] != 0;
+        if (observable && normal.dot(judge_.observable().normals[*sample].cast<double>()) < 0) {
+            normal = -normal;  // the surface is seen from behind its triangles
         }
         const double facing = -normal.dot(direction) / direction.norm();
         entered = entered || observable;

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <filesystem>
 #include <opencv2/core/mat.hpp>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -49,6 +51,9 @@ class CoveragePictures {
         double depth = 0;  ///< [m], 0 = nothing there
         bool observable = false;
     };
+    /// The nearest sample on the same side of the same surface, if one is near.
+    std::optional<std::uint32_t> sampleOf(const Eigen::Vector3f& point,
+                                          const Eigen::Vector3f& normal) const;
     Seen look(const Eye& eye, double column, double row, int width, int height) const;
     template <class Colour>
     cv::Mat paint(const Eye& eye, int width, int height, cv::Mat* depth, Colour&& colour) const;
