@@ -254,7 +254,7 @@ void Association::claim(const ViewPoints& view, float targetResolution, std::siz
     std::uint64_t old = slot.load(std::memory_order_relaxed);
     while (key < old && !slot.compare_exchange_weak(old, key, std::memory_order_relaxed)) {
     }
-    const bool fine = view.z[pixel] * view.footprint * view.stretch[pixel] <= targetResolution;
+    const bool fine = view.spacing(pixel) <= targetResolution;
     const auto flag = static_cast<std::uint8_t>(
         (view.kinds[pixel] == 0 ? kSomeSurrounded : kSomeOpen) | (fine ? kSomeFine : 0));
     auto flagSlot = atomic(flags[candidate]);

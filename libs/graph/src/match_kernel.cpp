@@ -89,7 +89,8 @@ class Search {
             const V lateral = hn::Mul(hn::Add(hn::Mul(du, du), hn::Mul(dv, dv)), scale_);
             const V along = hn::Max(leastAlong_, hn::Add(noise_, hn::LoadU(d_, in_.noise + e)));
             const V behind = hn::Mul(dz, dz);
-            const V distance = hn::Add(lateral, hn::Div(behind, along));
+            const V distance =
+                hn::Add(lateral, hn::Mul(hn::Set(d_, kDepthShare), hn::Div(behind, along)));
             const VI who = hn::LoadU(di_, in_.candidate + e);
             const auto inGate = hn::And(hn::Le(lateral, hn::Set(d_, 1.0F)), hn::Le(behind, along));
             const auto tie =

@@ -10,6 +10,10 @@ namespace riftmap {
 /// Standard deviations that still match.
 inline constexpr float kNoiseGate = 4.0F;
 
+/// What a difference in depth counts beside one across the ray. Little: a vertex chosen because its
+/// noise agrees with the pixel's would keep its noise.
+inline constexpr float kDepthShare = 0.125F;
+
 /// How far from a pixel's point a vertex may lie and still be the same surface: never below what
 /// the noise and the sampling at that depth blur anyway.
 struct Gate {
@@ -18,7 +22,8 @@ struct Gate {
 };
 inline Gate gateOf(float gamma, float spacing, float sigma, float stretch) {
     const float blur = 0.75F * spacing;
-    return {std::max(gamma, blur), std::max({gamma, kNoiseGate * sigma, blur * stretch})};
+    return {std::max(gamma, blur),
+            std::max({gamma, kNoiseGate * sigma, blur * std::max(1.0F, stretch)})};
 }
 
 /// One row of pixels to match. `entry` arrays lie in the order of pixels: those of pixel i are
@@ -36,7 +41,7 @@ struct MatchRow {
 };
 
 /// For each pixel with depth > 0 the candidate within its gate with the least
-///     (lateral / gate)^2 + (along the ray / gate)^2,
+///     (lateral / gate)^2 + kDepthShare (along the ray / gate)^2,
 /// the smallest candidate among equals. The same on every machine.
 void matchRow(const MatchRow& row);
 

@@ -15,10 +15,11 @@
 namespace riftmap {
 namespace {
 
+constexpr float kTinySigma = 1e-6F;   // [m]
 constexpr float kLeastSigma = 1e-4F;  // [m] nothing is known better than this by one view
 constexpr float kNoiseFactor = 3.0F;  // standard deviations
 constexpr float kNoisy = 0.25F;       // sigma per spacing above which normals come from patches
-constexpr unsigned kDeletingEvidence = 3;
+constexpr unsigned kDeletingEvidence = 2;    // views
 constexpr std::uint32_t kWellConnected = 4;  // edges of a pixel
 constexpr std::uint32_t kMostEdges = 9;      // what fits without a second chunk
 constexpr std::uint32_t kPagesAtOnce = 16;
@@ -163,7 +164,8 @@ void Merger::fuse(const View& view, Page& page, std::uint32_t slot, std::uint32_
     float sigma = compact::Sigma::decode(page.sigma[slot]);
     if (!paper()) {
         // One observation a view, however many pixels matched: their errors are not independent.
-        const float a = std::max(sigma, 1e-6F), b = std::max(points_.sigma[pixel], kLeastSigma);
+        const float a = std::max(sigma, kTinySigma),
+                    b = std::max(points_.sigma[pixel], kLeastSigma);
         const float gain = a * a / (a * a + b * b);
         const Eigen::Vector3f old = page.position(slot);
         const Eigen::Vector3f step = gain * (points_.inMap(column, row) - old);
@@ -205,7 +207,8 @@ void Merger::fuse(const View& view, Page& page, std::uint32_t slot, std::uint32_
     work.touched = work.touched || open != 0 || page.open[slot] != 0;
     page.open[slot] = open;
     // The pixels of a vertex are its share of the surface, where none of them is cut off.
-    if ((flags & Association::kSomeSurrounded) != 0 && (flags & Association::kSomeOpen) == 0) {
+    if (frontal(pixel) && (flags & Association::kSomeSurrounded) != 0 &&
+        (flags & Association::kSomeOpen) == 0) {
         const float area = static_cast<float>(seen_.areaOf[candidate]) * Association::kAreaUnit;
         const std::uint16_t code = compact::Area::encode(area);
         work.area += compact::areaUnits(code) - compact::areaUnits(page.area[slot]);
@@ -226,8 +229,7 @@ bool Merger::lookedThrough(const Candidate& candidate) const {
             const std::size_t i = points_.index(c, r);
             const float sigma =
                 std::sqrt(points_.sigma[i] * points_.sigma[i] + candidate.sigma * candidate.sigma);
-            const float spacing = points_.z[i] * points_.footprint * points_.stretch[i];
-            const float margin = std::max(kNoiseFactor * sigma, spacing);
+            const float margin = std::max(kNoiseFactor * sigma, points_.spacing(i));
             if (!(points_.z[i] > candidate.z + margin)) {
                 return false;
             }
@@ -246,20 +248,51 @@ void Merger::passOver(Page& page, std::uint32_t slot, std::uint32_t candidate, P
         }
         return;
     }
-    // Where closed surface shows at this vertex, the pixels there stand for its share already.
-    const int column = compact::roundPixel(seen.u);
-    const int row = compact::roundPixel(seen.v);
+    const int column = compact::roundPixel(seen.u), row = compact::roundPixel(seen.v);
     if (column < 0 || row < 0 || column >= points_.width || row >= points_.height) {
         return;
     }
     const std::size_t i = points_.index(column, row);
-    const float near =
-        std::max(Association::gate(points_, i, options_).depth, kNoiseGate * seen.sigma);
-    if (points_.z[i] > 0 && points_.kinds[i] == 0 && page.area[slot] != 0 &&
-        std::abs(points_.z[i] - seen.z) <= near) {
+    if (!(points_.z[i] > 0)) {
+        return;
+    }
+    // The depth that the view shows at the vertex itself, which lies beside the pixel's centre.
+    float disparity = points_.disparity[i];
+    if (points_.onPatch(column, row)) {
+        const PatchPlane& patch = points_.patch(column, row);
+        disparity += patch.slopeColumn * (seen.u - static_cast<float>(column)) +
+                     patch.slopeRow * (seen.v - static_cast<float>(row));
+    }
+    const float depth = points_.fb / disparity;
+    const float near = std::max(Association::gate(points_, i, options_).depth,
+                                kNoiseGate * std::hypot(points_.sigma[i], seen.sigma));
+    if (!(std::abs(depth - seen.z) <= near)) {
+        return;
+    }
+    fuseAlongRay(page, slot, seen, depth, points_.sigma[i], work);
+    if (frontal(i) && points_.kinds[i] == 0 && page.area[slot] != 0) {
+        // The pixels around stand for this vertex' share of the surface already.
         work.area -= compact::areaUnits(page.area[slot]);
         page.area[slot] = 0;
     }
+}
+
+/// A vertex in view that is no pixel's nearest (the map is denser than the view there) learns its
+/// depth all the same; its place across the ray stays, or neighbours would gather at pixels.
+void Merger::fuseAlongRay(Page& page, std::uint32_t slot, const Candidate& seen, float depth,
+                          float pixelSigma, PageWork& work) {
+    const float a = std::max(seen.sigma, kTinySigma), b = std::max(pixelSigma, kLeastSigma);
+    const float gain = a * a / (a * a + b * b);
+    const Eigen::Vector3f old = page.position(slot);
+    const Eigen::Vector3f step = (gain * (depth / seen.z - 1.0F)) * (old - points_.translation);
+    page.x[slot] += step.x();
+    page.y[slot] += step.y();
+    page.z[slot] += step.z();
+    const float sigma = a * b / std::sqrt(a * a + b * b);
+    page.sigma[slot] = compact::Sigma::encode(sigma);
+    const std::uint8_t before = page.open[slot];
+    page.open[slot] = openBits(before, page.state[slot], sigma);
+    work.touched = work.touched || before != 0;
 }
 
 void Merger::fusePage(const View& view, GraphStorage& storage, std::uint32_t which) {
@@ -376,8 +409,7 @@ void Merger::grow(const View& view, GraphStorage& storage, MergeResult& result) 
         page.sigma[slot] = compact::Sigma::encode(std::max(points_.sigma[pixel], kLeastSigma));
         page.area[slot] = compact::Area::encode(points_.area[pixel]);
         page.rgb[slot] = colourAt(view.image, pixel, points_.width);
-        const bool fine = points_.z[pixel] * points_.footprint * points_.stretch[pixel] <=
-                          static_cast<float>(options_.targetResolution);
+        const bool fine = points_.spacing(pixel) <= static_cast<float>(options_.targetResolution);
         page.state[slot] = static_cast<std::uint8_t>((points_.kinds[pixel] == 0 ? kSurrounded : 0) |
                                                      (fine ? kFineEnough : 0));
         page.open[slot] = openBits(points_.kinds[pixel], page.state[slot],

@@ -43,6 +43,8 @@ class Merger {
     void fuse(const View& view, Page& page, std::uint32_t slot, std::uint32_t candidate,
               PageWork& work);
     void passOver(Page& page, std::uint32_t slot, std::uint32_t candidate, PageWork& work);
+    void fuseAlongRay(Page& page, std::uint32_t slot, const Candidate& seen, float depth,
+                      float pixelSigma, PageWork& work);
     bool lookedThrough(const Candidate& candidate) const;
     void deleteSeenThrough(GraphStorage& storage, RiftFinder& rifts, MergeResult& result);
     void grow(const View& view, GraphStorage& storage, MergeResult& result);
@@ -52,6 +54,10 @@ class Merger {
     void refreshNormals(GraphStorage& storage);
     void finish(GraphStorage& storage, RiftFinder& rifts, std::int64_t& area);
     std::uint8_t openBits(std::uint8_t kinds, std::uint8_t state, float sigma) const;
+    /// Seen at less than 60 degrees: its share of the surface can be told.
+    bool frontal(std::size_t pixel) const {
+        return points_.stretch[pixel] >= 1.0F && points_.stretch[pixel] <= 2.0F;
+    }
     bool paper() const { return options_.fusion == GraphOptions::Fusion::kFirst; }
 
     GraphOptions options_;

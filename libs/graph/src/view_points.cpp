@@ -4,9 +4,10 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
-#include <Eigen/LU>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace riftmap {
 namespace {
@@ -121,18 +122,35 @@ void ViewPoints::computeAngles(int row) {
     const float y = rayY_[static_cast<std::size_t>(row)];
     for (int c = 0; c < width; ++c) {
         const std::size_t i = index(c, row);
-        const PatchPlane& p = patch(c, row);
         const float x = rayX_[static_cast<std::size_t>(c)];
         const float ray = std::sqrt(x * x + y * y + 1.0F);
-        float angle = 1.0F;
-        if (z[i] > 0 && onPatch(c, row)) {
+        float angle = 0.0F;
+        if (z[i] > 0) {
             // cos = |n . ray| / |ray| and z = distance / (n . ray)
-            angle = std::clamp(p.inverseDistance * z[i] * ray, 1.0F, kLargestStretch);
+            angle = onPatch(c, row) ? patch(c, row).inverseDistance * z[i] * ray
+                                    : angleFromNeighbours(c, row);
+            angle = angle > 0 ? std::clamp(angle, 1.0F, kLargestStretch) : 0.0F;
         }
         stretch[i] = angle;
         // z^2 / (fx fy |n . ray|), where 1 / |n . ray| = stretch / |ray|
-        area[i] = z[i] * z[i] * angle / (fx * fy * ray);
+        area[i] = z[i] * z[i] * std::max(1.0F, angle) / (fx * fy * ray);
     }
+}
+
+/// From the patch beside, where the pixel lies on its plane.
+float ViewPoints::angleFromPatches(int column, int row) const {
+    const std::size_t i = index(column, row);
+    for (const auto& [dc, dr] : {std::pair{-kPatch, 0}, {kPatch, 0}, {0, -kPatch}, {0, kPatch}}) {
+        const int c = column + dc, r = row + dr;
+        if (c < 0 || r < 0 || c >= width || r >= height) {
+            continue;
+        }
+        const PatchPlane& p = patch(c, r);
+        if (std::abs(disparity[i] - p.disparity(column, row)) <= p.tolerance) {
+            return p.inverseDistance * z[i] * inCamera(column, row, 1.0F).norm();
+        }
+    }
+    return 0.0F;
 }
 
 void ViewPoints::fitPatch(const DisparityImage& image, int patchColumn, int patchRow) {
@@ -196,6 +214,30 @@ void ViewPoints::fitPatch(const DisparityImage& image, int patchColumn, int patc
     plane.inverseDistance = scaled.norm();
     plane.normal = -scaled / plane.inverseDistance;
     plane.tolerance = tolerance;
+}
+
+/// From the pixels beside, where noise permits. 0 = unknown.
+float ViewPoints::angleFromNeighbours(int column, int row) const {
+    const std::size_t i = index(column, row);
+    if (sigma[i] > 0.25F * z[i] * footprint || column < 1 || row < 1 || column + 1 >= width ||
+        row + 1 >= height) {
+        return angleFromPatches(column, row);
+    }
+    // Of the two sides the one that lies nearer: the other may lie across a step.
+    const auto difference = [&](int dc, int dr) -> Eigen::Vector3f {
+        const float before = z[index(column - dc, row - dr)];
+        const float after = z[index(column + dc, row + dr)];
+        const Eigen::Vector3f here = inCamera(column, row, z[i]);
+        if (after > 0 && (!(before > 0) || std::abs(after - z[i]) <= std::abs(before - z[i]))) {
+            return inCamera(column + dc, row + dr, after) - here;
+        }
+        return before > 0 ? Eigen::Vector3f(here - inCamera(column - dc, row - dr, before))
+                          : Eigen::Vector3f(Eigen::Vector3f::Zero());
+    };
+    const Eigen::Vector3f normal = difference(1, 0).cross(difference(0, 1));
+    const Eigen::Vector3f ray = inCamera(column, row, 1.0F);
+    const float across = std::abs(normal.dot(ray));
+    return across > 0 ? normal.norm() * ray.norm() / across : 0.0F;
 }
 
 bool ViewPoints::explained(int c, int r, int c2, int r2, float tolerance) const {

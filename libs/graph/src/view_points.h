@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -44,11 +45,11 @@ class ViewPoints {
     Eigen::Matrix3f rotation;     ///< world_R_camera
     Eigen::Vector3f translation;  ///< of the camera in the map frame
 
-    std::vector<float> z;                    ///< depth [m]; 0 = no vertex
-    std::vector<float> sigma;                ///< standard deviation of z [m]
-    std::vector<float> disparity;            ///< fb / z [px]; only where z > 0
-    std::vector<float> stretch;              ///< 1 / cos of the viewing angle, in [1, 10]
-    std::vector<float> area;                 ///< surface that the pixel stands for [m^2]
+    std::vector<float> z;          ///< depth [m]; 0 = no vertex
+    std::vector<float> sigma;      ///< standard deviation of z [m]
+    std::vector<float> disparity;  ///< fb / z [px]; only where z > 0
+    std::vector<float> stretch;    ///< 1 / cos of the viewing angle in [1, 10]; 0 = unknown
+    std::vector<float> area;       ///< surface that the pixel stands for [m^2]
     std::vector<std::uint16_t> right, down;  ///< weight code of the edge there, or kNoEdge
     std::vector<std::uint8_t> kinds;         ///< OpenKind bits but kTooCoarse
     std::vector<PatchPlane> patches;         ///< a plane a patch, row-major
@@ -61,6 +62,10 @@ class ViewPoints {
         return patches[static_cast<std::size_t>(row / kPatch) *
                            static_cast<std::size_t>(patchColumns_) +
                        static_cast<std::size_t>(column / kPatch)];
+    }
+    /// Distance between neighbouring points of the surface at a pixel [m].
+    float spacing(std::size_t pixel) const {
+        return z[pixel] * footprint * std::max(1.0F, stretch[pixel]);
     }
     /// Eq. (1) in the camera frame.
     Eigen::Vector3f inCamera(int column, int row, float depth) const {
@@ -80,6 +85,8 @@ class ViewPoints {
     void computeDepth(const View& view, int row);
     void fitPatch(const DisparityImage& disparity, int patchColumn, int patchRow);
     void computeAngles(int row);
+    float angleFromPatches(int column, int row) const;
+    float angleFromNeighbours(int column, int row) const;
     void computeEdges(const GraphOptions& options, int row);
     void computeKinds(const GraphOptions& options, int firstColumn, int row);
     bool isHigh(const GraphOptions& options, float squared, int c, int r, int c2, int r2) const;
