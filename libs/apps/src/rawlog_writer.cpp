@@ -101,7 +101,11 @@ class RawlogWriter::Impl {
     Impl& operator=(const Impl&) = delete;
 
     void put(const mrpt::serialization::CSerializable& object) {
-        mrpt::serialization::archiveFrom(stream_) << object;
+        try {
+            mrpt::serialization::archiveFrom(stream_) << object;
+        } catch (const std::exception& e) {
+            throw FileError(file_.string() + ": cannot be written: " + oneLine(e.what()));
+        }
         ++count_;
     }
 

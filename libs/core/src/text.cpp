@@ -106,12 +106,14 @@ std::string nearestName(std::string_view name, const std::vector<std::string>& k
 }
 
 std::string oneLine(std::string_view what) {
+    // MRPT wraps exceptions into one another; the innermost, the cause, comes last.
     constexpr std::string_view kMessage = "Message:";
-    if (const auto at = what.find(kMessage); at != std::string_view::npos) {
+    if (const auto at = what.rfind(kMessage);
+        at != std::string_view::npos && what.find("MRPT exception") < at) {
         what.remove_prefix(at + kMessage.size());
-    }
-    for (const std::string_view trailer : {"Location:", "Call stack"}) {
-        what = what.substr(0, what.find(trailer));
+        for (const std::string_view trailer : {"Location:", "Call stack"}) {
+            what = what.substr(0, what.find(trailer));
+        }
     }
     std::string line;
     for (const auto word : words(what)) {

@@ -55,7 +55,7 @@ void load(OptionTable& table, const mrpt::config::CConfigFileBase& source,
         const auto same = [&](const std::string& k) { return lower(k) == lower(key); };
         const auto found = std::find_if(known.begin(), known.end(), same);
         if (found == known.end()) {
-            throw ConfigError("[" + section + "] " + key + ": unknown key; did you mean '" +
+            throw ConfigError(section + "." + key + ": unknown key; did you mean '" +
                               nearestName(key, known) + "'?");
         }
         const auto index = static_cast<std::size_t>(found - known.begin());

@@ -41,6 +41,15 @@ TEST(Text, OneLine) {
     EXPECT_EQ(oneLine("==== MRPT exception ====\nMessage:  bad\npose\nLocation: x.cpp:3: [f\nCall "
                       "stack backtrace:\n[0 ] f\n"),
               "bad pose");
+    // Nested: the cause, and no more when what came out goes through again.
+    const auto cause = oneLine(
+        "==== MRPT exception ====\nMessage:  while reading\nOriginal exception:\n==== MRPT "
+        "exception "
+        "====\nMessage:  cut\nLocation: a.cpp:1\nCall stack backtrace:\nLocation: b.cpp:2\n");
+    EXPECT_EQ(cause, "cut");
+    EXPECT_EQ(oneLine("x.rawlog: " + cause), "x.rawlog: cut");
+    EXPECT_EQ(oneLine("no Message: of MRPT's, no Location: either"),
+              "no Message: of MRPT's, no Location: either");
     EXPECT_EQ(oneLine(" \n"), "unknown error");
 }
 

@@ -18,7 +18,7 @@ namespace riftmap {
 /// CObservationStereoImages, serialised, drawn and saved like MRPT's own maps. In INI files it is
 /// `pixelGraph` (`pixelGraph_count = 1`); the keys of section [Graph] go into
 /// `..._pixelGraph_00_creationOpts`, those of [Stereo] into `..._pixelGraph_00_insertOpts`. An
-/// unknown key or a wrong value there throws ConfigError.
+/// unknown key or a wrong value there throws (MRPT rethrows it as an exception of its own).
 ///
 /// A program that does not know this class learns it from libriftmap-maps.so by LD_PRELOAD or as a
 /// plug-in; one that links it calls registerPixelGraphMap() once, so that the linker keeps it.
