@@ -29,7 +29,9 @@ using BoostGraph =
     boost::compressed_sparse_row_graph<boost::directedS, boost::no_property, EdgeWeight>;
 
 /// Rolling ground, 2 m and more below the camera.
-double height(double x, double y) { return 0.25 * std::sin(1.7 * x) * std::cos(1.3 * y); }
+double height(double x, double y) {
+    return 0.25 * std::sin(1.7 * x) * std::cos(1.3 * y);
+}
 
 riftmap::View viewFrom(double x, double y) {
     riftmap::View view;
@@ -169,10 +171,11 @@ int main(int argc, char** argv) {
             ratio.push_back(boostTime / ownTime);
         }
     }
-    std::printf("%zu vertices, %zu edges, 20 searches: own %.1f ms, Boost.Graph %.1f ms, ratio "
-                "%.2f (medians); largest difference of lengths %.2g m\n",
-                graph.vertexCount(), graph.edgeCount(), median(oursMs), median(boostMs),
-                median(ratio), worst);
+    std::printf(
+        "%zu vertices, %zu edges, 20 searches: own %.1f ms, Boost.Graph %.1f ms, ratio "
+        "%.2f (medians); largest difference of lengths %.2g m\n",
+        graph.vertexCount(), graph.edgeCount(), median(oursMs), median(boostMs), median(ratio),
+        worst);
     for (int i = 1; i + 1 < argc; ++i) {
         if (std::strcmp(argv[i], "--csv") == 0) {
             riftmap::CsvWriter csv(argv[i + 1], {"name", "value", "unit"});

@@ -59,7 +59,8 @@ TEST(FreeSpace, pixelsWithoutAMatchAreKnownOnlyWhereTheBackgroundIsFree) {
 
 TEST(FreeSpace, waysKeepTheClearance) {
     FreeSpace space(kBox, 0.1);
-    space.declareFreeOutside(Eigen::AlignedBox3d(Eigen::Vector3d(1, -0.5, -2), Eigen::Vector3d(2, 2, 2)));
+    space.declareFreeOutside(
+        Eigen::AlignedBox3d(Eigen::Vector3d(1, -0.5, -2), Eigen::Vector3d(2, 2, 2)));
     const Eigen::Vector3d start(0, 1, 0);
     const Eigen::Vector3d goal(3, 1, 0);
     space.updateReach(start, 0.3, kBox);
@@ -94,10 +95,10 @@ TEST(FreeSpace, theUnknownIsSeenThroughFreeSpaceOnly) {
     EXPECT_NEAR(s, 1.5, 0.2);
     EXPECT_NEAR(run.end, 3.0, 0.2);
     space.setSurface({Eigen::Vector3d(1.65, 0.05, 0.05)});
-    EXPECT_LT(space.firstUnknown(eye + Eigen::Vector3d(0, 0.05, 0.05),
-                                      Eigen::Vector3d::UnitX(), 5.0)
-                  .begin,
-              0);
+    EXPECT_LT(
+        space.firstUnknown(eye + Eigen::Vector3d(0, 0.05, 0.05), Eigen::Vector3d::UnitX(), 5.0)
+            .begin,
+        0);
     EXPECT_LT(space.firstUnknown(eye, Eigen::Vector3d::UnitX(), 1.0).begin, 0);
     const Eigen::Vector3d place = eye + s * Eigen::Vector3d::UnitX();
     for (int i = 0; i < FreeSpace::kTries; ++i) {

@@ -22,8 +22,8 @@ inline StereoCamera smallCamera() {
 
 /// `depthAlong(origin, direction)`: distance in lengths of the direction to the surface, if any.
 inline View viewOf(const Pose& pose,
-                   const std::function<std::optional<double>(
-                       const Eigen::Vector3d&, const Eigen::Vector3d&)>& depthAlong,
+                   const std::function<std::optional<double>(const Eigen::Vector3d&,
+                                                             const Eigen::Vector3d&)>& depthAlong,
                    int firstColumn = 0) {
     View view;
     view.camera = smallCamera();

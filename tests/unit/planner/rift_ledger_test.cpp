@@ -73,7 +73,7 @@ TEST_F(LedgerOnWall, vainTriesAreNotRepeatedAndEndTheTear) {
     ledger.judge(summary, {key}, {before}, eye);
     EXPECT_TRUE(RiftLedger::tried(record, eye));
     EXPECT_TRUE(RiftLedger::tried(record, eye + Eigen::Vector3d(0, 0.1, 0)));
-    EXPECT_FALSE(RiftLedger::tried(record, p + Eigen::Vector3d(-1, 1, 0)));  // another side
+    EXPECT_FALSE(RiftLedger::tried(record, p + Eigen::Vector3d(-1, 1, 0)));    // another side
     EXPECT_FALSE(RiftLedger::tried(record, p + Eigen::Vector3d(-0.4, 0, 0)));  // nearer
     ledger.judge(summary, {key}, {before}, p + Eigen::Vector3d(-1, 1, 0));
     EXPECT_EQ(record.state, RiftState::kOpen);
@@ -97,7 +97,8 @@ TEST_F(LedgerOnWall, whatIsOpenAtTheEndIsDeferred) {
 }
 
 TEST_F(LedgerOnWall, viewsOverTheRimPromiseMoreThanTheOneTaken) {
-    FreeSpace space(Eigen::AlignedBox3d(Eigen::Vector3d(-1, -4, -4), Eigen::Vector3d(3, 4, 4)), 0.1);
+    FreeSpace space(Eigen::AlignedBox3d(Eigen::Vector3d(-1, -4, -4), Eigen::Vector3d(3, 4, 4)),
+                    0.1);
     const View view = test::viewOf(lookAt({0, 0, 0}, {1, 0, 0}), test::wall(2.0));
     PlatformLimits limits;
     limits.farLimit = 6;
