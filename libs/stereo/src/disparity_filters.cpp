@@ -2,31 +2,33 @@
 #include "riftmap/stereo/disparity_filters.h"
 
 #include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <cmath>
 
 namespace riftmap {
 
-std::uint32_t IsolatedFilter::root(std::uint32_t run) {
-    while (runs_[run].group != run) {
-        runs_[run].group = runs_[runs_[run].group].group;  // halves the way for the next one
-        run = runs_[run].group;
+std::uint32_t IsolatedFilter::root(Runs& runs, std::uint32_t run) {
+    while (runs[run].group != run) {
+        runs[run].group = runs[runs[run].group].group;  // halves the way for the next one
+        run = runs[run].group;
     }
     return run;
 }
 
-void IsolatedFilter::unite(std::uint32_t a, std::uint32_t b) {
-    a = root(a);
-    b = root(b);
+void IsolatedFilter::unite(Runs& runs, std::uint32_t a, std::uint32_t b) {
+    a = root(runs, a);
+    b = root(runs, b);
     if (a != b) {
         const auto [low, high] = std::minmax(a, b);
-        runs_[high].group = low;
-        runs_[low].size += runs_[high].size;
+        runs[high].group = low;
+        runs[low].size += runs[high].size;
     }
 }
 
-void IsolatedFilter::findRuns(const DisparityImage& image, int row, float maxDifference) {
+void IsolatedFilter::findRuns(const DisparityImage& image, int row, float maxDifference,
+                              Runs& runs) {
     const float* d = image.disparity.data() + image.index(0, row);
     for (int c = 0; c < image.width;) {
         if (!std::isfinite(d[c])) {
@@ -38,24 +40,23 @@ void IsolatedFilter::findRuns(const DisparityImage& image, int row, float maxDif
         while (c < image.width && std::abs(d[c] - d[c - 1]) <= maxDifference) {
             ++c;
         }
-        runs_.push_back({.row = row,
-                         .first = first,
-                         .last = c,
-                         .group = static_cast<std::uint32_t>(runs_.size()),
-                         .size = static_cast<std::uint32_t>(c - first)});
+        runs.push_back({.row = row,
+                        .first = first,
+                        .last = c,
+                        .group = static_cast<std::uint32_t>(runs.size()),
+                        .size = static_cast<std::uint32_t>(c - first)});
     }
 }
 
 void IsolatedFilter::joinRows(const DisparityImage& image, std::size_t above, std::size_t here,
-                              float maxDifference) {
-    const std::size_t end = runs_.size();
+                              std::size_t end, float maxDifference, Runs& runs) {
     for (std::size_t a = above, b = here; a < here && b < end;) {
-        const Run& upper = runs_[a];
-        const Run& lower = runs_[b];
+        const Run& upper = runs[a];
+        const Run& lower = runs[b];
         const int last = std::min(upper.last, lower.last);
         for (int c = std::max(upper.first, lower.first); c < last; ++c) {
             if (std::abs(image.at(c, upper.row) - image.at(c, lower.row)) <= maxDifference) {
-                unite(static_cast<std::uint32_t>(a), static_cast<std::uint32_t>(b));
+                unite(runs, static_cast<std::uint32_t>(a), static_cast<std::uint32_t>(b));
                 break;
             }
         }
@@ -67,23 +68,55 @@ void IsolatedFilter::joinRows(const DisparityImage& image, std::size_t above, st
     }
 }
 
-void IsolatedFilter::apply(DisparityImage& image, int minSize, float maxDifference) {
-    if (minSize <= 1) {
-        return;
-    }
-    runs_.clear();
+void IsolatedFilter::label(const DisparityImage& image, int first, int last, float maxDifference,
+                           Runs& runs) {
+    runs.clear();
     std::size_t above = 0;
-    for (int row = 0; row < image.height; ++row) {
-        const std::size_t here = runs_.size();
-        findRuns(image, row, maxDifference);
-        if (row > 0) {
-            joinRows(image, above, here, maxDifference);
-        }
+    for (int row = first; row < last; ++row) {
+        const std::size_t here = runs.size();
+        findRuns(image, row, maxDifference, runs);
+        joinRows(image, above, here, runs.size(), maxDifference, runs);
         above = here;
     }
+}
+
+void IsolatedFilter::joinStrips(const DisparityImage& image, float maxDifference) {
+    runs_.clear();
+    for (const Runs& strip : strips_) {
+        const std::size_t here = runs_.size();
+        for (Run run : strip) {
+            run.group += static_cast<std::uint32_t>(here);
+            runs_.push_back(run);
+        }
+        if (here == 0 || strip.empty() || runs_[here - 1].row + 1 != strip.front().row) {
+            continue;
+        }
+        std::size_t above = here;
+        while (above > 0 && runs_[above - 1].row == runs_[here - 1].row) {
+            --above;
+        }
+        std::size_t end = here;
+        while (end < runs_.size() && runs_[end].row == runs_[here].row) {
+            ++end;
+        }
+        joinRows(image, above, here, end, maxDifference, runs_);
+    }
+}
+
+void IsolatedFilter::apply(DisparityImage& image, int minSize, float maxDifference) {
+    if (minSize <= 1 || image.height == 0) {
+        return;
+    }
+    const int strips = std::clamp(tbb::this_task_arena::max_concurrency(), 1, image.height);
+    strips_.resize(static_cast<std::size_t>(strips));
+    tbb::parallel_for(0, strips, [&](int i) {
+        label(image, i * image.height / strips, (i + 1) * image.height / strips, maxDifference,
+              strips_[static_cast<std::size_t>(i)]);
+    });
+    joinStrips(image, maxDifference);
     for (std::uint32_t i = 0; i < runs_.size(); ++i) {
         const Run& run = runs_[i];
-        if (runs_[root(i)].size < static_cast<std::uint32_t>(minSize)) {
+        if (runs_[root(runs_, i)].size < static_cast<std::uint32_t>(minSize)) {
             float* d = image.disparity.data() + image.index(0, run.row);
             std::fill(d + run.first, d + run.last, kNoDisparity);
         }

@@ -319,7 +319,7 @@ void searchLeft(const MatchJob& job, const Strip& s, const Minima& out, std::siz
 
 /// Minima of a row -> disparity and sigma.
 void finishRow(const MatchJob& job, const Strip& s, const Minima& m, int row) {
-    for (std::size_t x = 0; x < s.width; ++x) {
+    for (auto x = static_cast<std::size_t>(job.firstColumn); x < s.width; ++x) {
         m.partner[x] = s.rightIndex[s.width - 1 - x + m.index[x]];
     }
     const hn::CappedTag<float, 16> df;
@@ -369,13 +369,14 @@ void finishRow(const MatchJob& job, const Strip& s, const Minima& m, int row) {
 
 void searchRow(const MatchJob& job, const Strip& s, int row) {
     const Minima minima(s);
+    const auto first = static_cast<std::size_t>(job.firstColumn);
     std::fill(s.rightBest, s.rightBest + s.width + s.stride, kWorst);
     std::fill(s.rightIndex, s.rightIndex + s.width + s.stride, kWorst);
     if (job.penaltyLarge > 0) {
         combineWindows(job, s, row, 0, s.width);
         smoothAlong(job, s);
         searchRight(s, 0, s.width);
-        searchLeft(job, s, minima, 0, s.width);
+        searchLeft(job, s, minima, first, s.width);
     } else {
         // A few columns at a time, so that their costs are still in the first-level cache.
         const std::size_t step = std::max<std::size_t>(8, 8192 / s.stride / 8 * 8);
@@ -383,7 +384,7 @@ void searchRow(const MatchJob& job, const Strip& s, int row) {
             const std::size_t end = std::min(s.width, x + step);
             combineWindows(job, s, row, x, end);
             searchRight(s, x, end);
-            searchLeft(job, s, minima, x, end);
+            searchLeft(job, s, minima, std::max(x, first), end);
         }
     }
     finishRow(job, s, minima, row);

@@ -182,10 +182,12 @@ class NearGuard {
         StereoOptions coarse = options;
         const int end = options.minDisparity + options.numDisparities + options.guard;
         coarse.minDisparity = static_cast<int>(std::floor(options.minDisparity / double{kCoarse}));
-        coarse.numDisparities = (end + kCoarse - 1) / kCoarse - coarse.minDisparity;
+        // Two more: a minimum needs a neighbour on either side.
+        coarse.numDisparities =
+            static_cast<int>(std::ceil(end / double{kCoarse})) + 2 - coarse.minDisparity;
         coarse.window = std::min(options.window, 7);
         coarse.semiGlobal = false;
-        coarse.subpixel = false;
+        coarse.subpixel = true;
         if (options.guard <= 0 || image.width < 2 * kCoarse || image.height < 2 * kCoarse) {
             return;
         }
@@ -196,16 +198,23 @@ class NearGuard {
     }
 
  private:
+    /// Discards what lies in or beside a coarse pixel whose surface is too near.
     void discard(DisparityImage& image) const {
-        const float beyond = image.maxDisparity + kCoarse / 2;
-        for (int r = 0; r < found_.height * kCoarse; ++r) {
+        const float beyond = image.maxDisparity + 1;
+        for (int r = 0; r < found_.height; ++r) {
             for (int c = 0; c < found_.width; ++c) {
-                const float d = found_.at(c, r / kCoarse) * kCoarse;
-                if (d > beyond && std::isfinite(d)) {
-                    auto* first = image.disparity.data() + image.index(c * kCoarse, r);
-                    std::fill(first, first + kCoarse, kNoDisparity);
+                if (found_.valid(c, r) && found_.at(c, r) * kCoarse >= beyond) {
+                    clear(image,
+                          cv::Rect((c - 1) * kCoarse, (r - 1) * kCoarse, 3 * kCoarse, 3 * kCoarse));
                 }
             }
+        }
+    }
+    static void clear(DisparityImage& image, cv::Rect block) {
+        block &= cv::Rect(0, 0, image.width, image.height);
+        for (int r = block.y; r < block.y + block.height; ++r) {
+            auto* first = image.disparity.data() + image.index(block.x, r);
+            std::fill(first, first + block.width, kNoDisparity);
         }
     }
 

@@ -281,17 +281,21 @@ void guard(const Image& left, const Image& right, const StereoOptions& o, Dispar
     StereoOptions coarse = o;
     coarse.minDisparity = static_cast<int>(std::floor(o.minDisparity / 4.0));
     const int end = o.minDisparity + o.numDisparities + o.guard;
-    coarse.numDisparities = static_cast<int>(std::ceil(end / 4.0)) - coarse.minDisparity;
+    coarse.numDisparities = static_cast<int>(std::ceil(end / 4.0)) + 2 - coarse.minDisparity;
     coarse.window = std::min(7, o.window);
     coarse.semiGlobal = false;
-    coarse.subpixel = false;
+    coarse.subpixel = true;
     const DisparityImage found = level(shrunk(left), shrunk(right), coarse, 0);
-    for (int y = 0; y < found.height * 4; ++y) {
-        for (int x = 0; x < found.width * 4; ++x) {
-            if (found.valid(x / 4, y / 4) &&
-                found.at(x / 4, y / 4) * 4 >
-                    static_cast<float>(o.minDisparity + o.numDisparities + 1)) {
-                out.disparity[out.index(x, y)] = kNoDisparity;
+    const auto tooNear = [&](int x, int y) {
+        return x >= 0 && y >= 0 && x < found.width && y < found.height && found.valid(x, y) &&
+               found.at(x, y) * 4 >= static_cast<float>(o.minDisparity + o.numDisparities);
+    };
+    for (int y = 0; y < out.height; ++y) {
+        for (int x = 0; x < out.width; ++x) {
+            for (int k = 0; k < 9; ++k) {
+                if (tooNear(x / 4 + k % 3 - 1, y / 4 + k / 3 - 1)) {
+                    out.disparity[out.index(x, y)] = kNoDisparity;
+                }
             }
         }
     }

@@ -36,7 +36,7 @@ struct StereoOptions {
     double penaltySmall = 1.2;      ///< of a step of 1 px [grey levels a pixel of the window]
     double penaltyLarge = 8;        ///< of any larger step [grey levels a pixel of the window]
 
-    int guard = 64;  ///< how far beyond the range nearer surfaces are looked for, coarsely [px]
+    int guard = 56;  ///< how far beyond the range nearer surfaces are looked for, coarsely [px]
     bool leftRightCheck = true;
     int leftRightTolerance = 2;   ///< largest difference of the two directions [px]
     int uniqueness = 3;           ///< the second best minimum is at least so much worse [%]

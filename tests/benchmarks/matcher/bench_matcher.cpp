@@ -1,0 +1,324 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Times PaperMatcher against OpenCV's matchers by turns in one process, and scores all of them
+// against true disparity. Prints tables; --csv FILE writes `figure,value,unit`.
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <functional>
+#include <iostream>
+#include <memory>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/core/utility.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "middlebury.h"
+#include "riftmap/core/csv.h"
+#include "riftmap/stereo/opencv_matchers.h"
+#include "riftmap/stereo/paper_matcher.h"
+
+namespace riftmap::bench {
+namespace {
+
+/// A matcher by the name it has in the tables.
+struct Contender {
+    std::string name;
+    std::function<std::unique_ptr<StereoMatcher>(int numDisparities)> make;
+};
+
+/// The settings of the table: those of the library, but for what is said here. OpenCV's matchers
+/// get a uniqueness of 10 % (the middle of the 5 .. 15 that its documentation advises; the
+/// `_5` and `_15` variants show both ends) and the same filter of isolated groups.
+std::vector<Contender> contenders() {
+    const auto paper = [](auto&& change) {
+        return [change](int n) -> std::unique_ptr<StereoMatcher> {
+            StereoOptions o;
+            o.numDisparities = n;
+            change(o);
+            return std::make_unique<PaperMatcher>(o);
+        };
+    };
+    const auto openCv = [](int n, int uniqueness) {
+        StereoOptions o;
+        o.numDisparities = n;
+        o.uniqueness = uniqueness;
+        o.leftRightTolerance = 1;
+        return o;
+    };
+    const auto block = [openCv](int uniqueness) {
+        return [=](int n) -> std::unique_ptr<StereoMatcher> {
+            return std::make_unique<OpenCvBlockMatcher>(openCv(n, uniqueness));
+        };
+    };
+    const auto sgbm = [openCv](int uniqueness, bool full) {
+        return [=](int n) -> std::unique_ptr<StereoMatcher> {
+            return std::make_unique<OpenCvSgbmMatcher>(openCv(n, uniqueness), full);
+        };
+    };
+    const auto semiGlobal = [](StereoOptions& o) {
+        o.semiGlobal = true;
+        o.prefilter = Prefilter::kGradient;
+        o.prefilterGain = 1;
+        o.prefilterCap = 31;
+        o.truncation = 62;
+    };
+    return {{"paper", paper([](StereoOptions&) {})},
+            {"paper_semi_global", paper(semiGlobal)},
+            {"paper_dense", paper([semiGlobal](StereoOptions& o) {
+                 semiGlobal(o);
+                 o.silhouetteReach = 0;
+                 o.uniqueness = 1;
+                 o.isolatedSize = 50;
+             })},
+            {"paper_one_window", paper([](StereoOptions& o) {
+                 o.supportingWindows = false;
+                 o.silhouetteReach = 0;
+             })},
+            {"opencv_bm", block(10)},
+            {"opencv_bm_5", block(5)},
+            {"opencv_bm_15", block(15)},
+            {"opencv_sgbm", sgbm(10, false)},
+            {"opencv_sgbm_full", sgbm(10, true)}};
+}
+
+class Figures {
+ public:
+    explicit Figures(const std::string& file) {
+        if (!file.empty()) {
+            csv_ = std::make_unique<CsvWriter>(file,
+                                               std::vector<std::string>{"figure", "value", "unit"});
+        }
+    }
+    void add(const std::string& figure, double value, const char* unit) {
+        if (csv_) {
+            csv_->row({figure, value, unit});
+        }
+    }
+
+ private:
+    std::unique_ptr<CsvWriter> csv_;
+};
+
+double median(std::vector<double> values) {
+    std::nth_element(values.begin(),
+                     values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
+    return values[values.size() / 2];
+}
+
+/// 512 x 384: the middle of the Motorcycle pair, or texture at several depths where it is absent.
+std::pair<cv::Mat, cv::Mat> timedPair(const std::string& folder) {
+    const cv::Size size(512, 384);
+    cv::Mat left, right;
+    if (const auto pair = loadPair(folder, "motorcycle")) {
+        const cv::Rect middle((pair->left.cols - size.width) / 2,
+                              (pair->left.rows - size.height) / 2, size.width, size.height);
+        cv::cvtColor(pair->left(middle), left, cv::COLOR_BGR2GRAY);
+        cv::cvtColor(pair->right(middle), right, cv::COLOR_BGR2GRAY);
+        return {left, right};
+    }
+    cv::Mat texture(size.height, size.width + 64, CV_8UC1);
+    cv::RNG rng(1);
+    rng.fill(texture, cv::RNG::UNIFORM, 0, 256);
+    cv::GaussianBlur(texture, texture, {3, 3}, 0.8);
+    left = texture.colRange(0, size.width).clone();
+    right = left.clone();
+    for (int band = 0; band < 4; ++band) {
+        const auto rows = cv::Range(band * size.height / 4, (band + 1) * size.height / 4);
+        const int d = 8 + 12 * band;
+        texture(rows, cv::Range(d, d + size.width)).copyTo(right.rowRange(rows));
+    }
+    return {left, right};
+}
+
+/// Median times by turns, so that a busy moment of the machine meets all of them.
+void timeAll(const std::string& folder, int rounds, Figures& figures) {
+    const auto [left, right] = timedPair(folder);
+    cv::setNumThreads(1);
+    StereoOptions options;  // window 11, 64 disparities, all stages on
+    PaperMatcher paper(options);
+    StereoOptions semiGlobalOptions;
+    semiGlobalOptions.semiGlobal = true;
+    PaperMatcher semiGlobal(semiGlobalOptions);
+    const auto bm = cv::StereoBM::create(options.numDisparities, options.window);
+    bm->setDisp12MaxDiff(1);
+    const auto sgbm = cv::StereoSGBM::create(0, options.numDisparities, 5, 200, 800, 1, 63, 10, 0,
+                                             0, cv::StereoSGBM::MODE_SGBM_3WAY);
+    DisparityImage disparity;
+    cv::Mat raw;
+    tbb::task_arena one(1), two(2);
+    struct Turn {
+        std::string name;
+        std::function<void()> work;
+        std::vector<double> ms;
+    };
+    const auto in = [&](tbb::task_arena& arena, PaperMatcher& matcher) {
+        return [&] { arena.execute([&] { matcher.compute(left, right, disparity); }); };
+    };
+    std::vector<Turn> turns = {
+        {"paper, 1 thread", in(one, paper), {}},
+        {"cv::StereoBM, 1 thread", [&] { bm->compute(left, right, raw); }, {}},
+        {"paper, 2 threads", in(two, paper), {}},
+        {"paper semi-global, 1 thread", in(one, semiGlobal), {}},
+        {"cv::StereoSGBM 3-way, 1 thread", [&] { sgbm->compute(left, right, raw); }, {}}};
+    for (int round = -2; round < rounds; ++round) {  // two rounds to warm up
+        for (auto& turn : turns) {
+            const auto start = std::chrono::steady_clock::now();
+            turn.work();
+            const std::chrono::duration<double, std::milli> ms =
+                std::chrono::steady_clock::now() - start;
+            if (round >= 0) {
+                turn.ms.push_back(ms.count());
+            }
+        }
+    }
+    std::printf("%d x %d, 64 disparities, window 11, median of %d rounds by turns\n", left.cols,
+                left.rows, rounds);
+    for (const auto& turn : turns) {
+        std::printf("  %-32s %7.2f ms\n", turn.name.c_str(), median(turn.ms));
+    }
+    const auto ms = [&](std::size_t i) { return median(turns[i].ms); };
+    const auto ratio = [&](const char* figure, double value) {
+        std::printf("  %-32s %7.3f\n", figure, value);
+        figures.add(figure, value, "");
+    };
+    ratio("time_ratio_bm_1thread", ms(0) / ms(1));
+    ratio("time_ratio_sgbm_1thread", ms(0) / ms(4));
+    ratio("speedup_2threads", ms(0) / ms(2));
+    ratio("semi_global_time_ratio_bm_1thread", ms(3) / ms(1));
+    ratio("semi_global_time_ratio_sgbm_1thread", ms(3) / ms(4));
+    figures.add("paper_1thread", ms(0), "ms");
+    figures.add("opencv_bm_1thread", ms(1), "ms");
+    figures.add("opencv_sgbm_1thread", ms(4), "ms");
+}
+
+void writeScore(const std::string& prefix, const Score& s, Figures& figures) {
+    figures.add(prefix + ".matched", s.matched, "%");
+    figures.add(prefix + ".bad1", s.bad1, "%");
+    figures.add(prefix + ".bad2", s.bad2, "%");
+    figures.add(prefix + ".mean_error", s.meanError, "px");
+    figures.add(prefix + ".matched_steps", s.matchedSteps, "%");
+    figures.add(prefix + ".bad1_steps", s.bad1Steps, "%");
+    figures.add(prefix + ".bad2_steps", s.bad2Steps, "%");
+    figures.add(prefix + ".mean_error_steps", s.meanErrorSteps, "px");
+    figures.add(prefix + ".matched_occluded", s.occluded, "%");
+    figures.add(prefix + ".residual", s.residual, "");
+}
+
+void saveDisparity(const std::string& file, const DisparityImage& disparity, int range) {
+    cv::Mat picture(disparity.height, disparity.width, CV_8UC1);
+    for (int r = 0; r < picture.rows; ++r) {
+        for (int c = 0; c < picture.cols; ++c) {
+            const float level = disparity.at(c, r) * 255.0F / static_cast<float>(range);
+            picture.at<std::uint8_t>(r, c) =
+                cv::saturate_cast<std::uint8_t>(disparity.valid(c, r) ? level : 0.0F);
+        }
+    }
+    cv::Mat colour;
+    cv::applyColorMap(picture, colour, cv::COLORMAP_TURBO);
+    for (int r = 0; r < picture.rows; ++r) {
+        for (int c = 0; c < picture.cols; ++c) {
+            if (!disparity.valid(c, r)) {
+                colour.at<cv::Vec3b>(r, c) = {255, 255, 255};
+            }
+        }
+    }
+    if (!cv::imwrite(file, colour)) {
+        throw std::runtime_error(file + ": cannot be written");
+    }
+}
+
+/// Share of the pixels nearer than a range cut to `numDisparities` that are matched all the same.
+double invented(const Pair& pair, const Contender& contender, int numDisparities) {
+    DisparityImage found;
+    contender.make(numDisparities)->compute(pair.left, pair.right, found);
+    double tooNear = 0, matched = 0;
+    for (int r = 0; r < found.height; ++r) {
+        for (int c = found.firstColumn; c < found.width; ++c) {
+            const float truth = pair.truth.at<float>(r, c);
+            if (std::isfinite(truth) && truth > static_cast<float>(numDisparities + 1)) {
+                ++tooNear;
+                matched += found.valid(c, r) ? 1 : 0;
+            }
+        }
+    }
+    return tooNear > 0 ? 100 * matched / tooNear : 0;
+}
+
+void scoreAll(const std::string& folder, const std::string& pictures, Figures& figures) {
+    cv::setNumThreads(-1);
+    for (const char* name : {"motorcycle", "aloe", "cones", "tsukuba"}) {
+        const auto pair = loadPair(folder, name);
+        if (!pair) {
+            std::printf("%s: SKIPPED, not in %s\n", name, folder.c_str());
+            continue;
+        }
+        std::printf("\n%-10s %-18s %7s %6s %6s %6s | %7s %6s %6s | %8s %8s %8s\n", name,
+                    "(percent)", "matched", "bad1", "bad2", "mean", "matched", "bad1", "bad2",
+                    "occluded", "residual", "too near");
+        for (const auto& contender : contenders()) {
+            DisparityImage found;
+            contender.make(pair->numDisparities)->compute(pair->left, pair->right, found);
+            const Score s = score(*pair, found);
+            const double nearer = invented(*pair, contender, pair->numDisparities / 2);
+            std::printf(
+                "%-10s %-18s %7.2f %6.2f %6.2f %6.3f | %7.2f %6.2f %6.2f | %8.1f %8.2f %8.2f\n", "",
+                contender.name.c_str(), s.matched, s.bad1, s.bad2, s.meanError, s.matchedSteps,
+                s.bad1Steps, s.bad2Steps, s.occluded, s.residual, nearer);
+            const std::string prefix = std::string(name) + "." + contender.name;
+            writeScore(prefix, s, figures);
+            figures.add(prefix + ".invented_too_near", nearer, "%");
+            if (!pictures.empty()) {
+                saveDisparity(pictures + "/" + prefix + ".png", found, pair->numDisparities);
+            }
+        }
+    }
+}
+
+std::string defaultData() {
+    const char* data = std::getenv("RIFTMAP_DATA");
+    return (data != nullptr ? std::string(data) : RIFTMAP_SOURCE_DIR "/../shared/data") +
+           "/middlebury";
+}
+
+int run(int argc, char** argv) {
+    std::string csv, pictures, folder = defaultData();
+    int rounds = 41;
+    for (int i = 1; i < argc; i += 2) {
+        const std::string flag = argv[i];
+        if (i + 1 == argc ||
+            (flag != "--csv" && flag != "--data" && flag != "--pictures" && flag != "--rounds")) {
+            std::cerr
+                << "bench-matcher [--csv FILE] [--data MIDDLEBURY_FOLDER] [--pictures FOLDER] "
+                   "[--rounds N]\n";
+            return 2;
+        }
+        if (flag == "--rounds") {
+            rounds = std::max(1, std::atoi(argv[i + 1]));
+        } else {
+            (flag == "--csv" ? csv : flag == "--data" ? folder : pictures) = argv[i + 1];
+        }
+    }
+    Figures figures(csv);
+    timeAll(folder, rounds, figures);
+    scoreAll(folder, pictures, figures);
+    return 0;
+}
+
+}  // namespace
+}  // namespace riftmap::bench
+
+int main(int argc, char** argv) {
+    try {
+        return riftmap::bench::run(argc, argv);
+    } catch (const std::exception& e) {
+        std::cerr << "bench-matcher: " << e.what() << "\n";
+        return 1;
+    }
+}
