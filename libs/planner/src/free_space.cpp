@@ -8,7 +8,6 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <queue>
 #include <stdexcept>
 #include <string>
 
@@ -286,8 +285,13 @@ void FreeSpace::noteTry(const Eigen::Vector3d& point) {
 
 void FreeSpace::markClear(double clearance, const Eigen::AlignedBox3d& limits) {
     clear_.assign(voxels_.size(), 0);
-    for (std::size_t i = 0; i < voxels_.size(); ++i) {
-        clear_[i] = passable(voxels_[i]) && limits.contains(centre(coordinates(i))) ? 1 : 0;
+    std::size_t at = 0;
+    for (int z = 0; z < size_.z(); ++z) {
+        for (int y = 0; y < size_.y(); ++y) {
+            for (int x = 0; x < size_.x(); ++x, ++at) {
+                clear_[at] = passable(voxels_[at]) && limits.contains(centre({x, y, z})) ? 1 : 0;
+            }
+        }
     }
     // The surface may lie anywhere in a voxel that is not free, and the way between two centres
     // dips below the clearance of both: one voxel more covers the two.
@@ -318,36 +322,48 @@ void FreeSpace::searchFrom(const Eigen::Vector3i& start) {
     parent_.assign(voxels_.size(), kNoParent);
     struct Step {
         Eigen::Vector3i offset;
+        std::ptrdiff_t jump;  ///< in the array
         float length;
     };
     std::vector<Step> steps;
     for (const Eigen::Vector3i& o : ball(1.8)) {
         if (o != Eigen::Vector3i::Zero()) {
-            steps.push_back({o, static_cast<float>(o.cast<double>().norm() * voxel_)});
+            const std::ptrdiff_t jump =
+                (static_cast<std::ptrdiff_t>(o.z()) * size_.y() + o.y()) * size_.x() + o.x();
+            steps.push_back({o, jump, static_cast<float>(o.cast<double>().norm() * voxel_)});
         }
     }
-    using Entry = std::pair<float, std::uint32_t>;
-    std::priority_queue<Entry, std::vector<Entry>, std::greater<>> open;
+    // No step is shorter than a voxel, so voxels whose distances share a bucket of that width
+    // cannot shorten each other's way: their order is free.
+    std::vector<std::vector<std::uint32_t>> buckets(1);
     const auto first = static_cast<std::uint32_t>(index(start));
     distance_[first] = 0;
-    open.emplace(0.0F, first);
-    while (!open.empty()) {
-        const auto [d, i] = open.top();
-        open.pop();
-        if (d > distance_[i]) {
-            continue;
-        }
-        const Eigen::Vector3i v = coordinates(i);
-        for (const Step& s : steps) {
-            const Eigen::Vector3i w = v + s.offset;
-            if (!inside(w)) {
-                continue;
+    buckets[0].push_back(first);
+    const auto width = static_cast<float>(voxel_);
+    const Eigen::Vector3i last = size_ - Eigen::Vector3i::Ones();
+    for (std::size_t b = 0; b < buckets.size(); ++b) {
+        const std::vector<std::uint32_t> now = std::move(buckets[b]);
+        for (const std::uint32_t i : now) {
+            const float d = distance_[i];
+            if (static_cast<std::size_t>(d / width) != b) {
+                continue;  // a shorter way was found since
             }
-            const std::size_t j = index(w);
-            if (clear_[j] != 0 && d + s.length < distance_[j]) {
-                distance_[j] = d + s.length;
-                parent_[j] = i;
-                open.emplace(distance_[j], static_cast<std::uint32_t>(j));
+            const Eigen::Vector3i v = coordinates(i);
+            const bool border = (v.array() == 0).any() || (v.array() == last.array()).any();
+            for (const Step& s : steps) {
+                if (border && !inside(v + s.offset)) {
+                    continue;
+                }
+                const auto j = static_cast<std::uint32_t>(static_cast<std::ptrdiff_t>(i) + s.jump);
+                if (clear_[j] != 0 && d + s.length < distance_[j]) {
+                    distance_[j] = d + s.length;
+                    parent_[j] = i;
+                    const auto to = static_cast<std::size_t>(distance_[j] / width);
+                    if (buckets.size() <= to) {
+                        buckets.resize(to + 1);
+                    }
+                    buckets[to].push_back(j);
+                }
             }
         }
     }

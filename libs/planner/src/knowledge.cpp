@@ -73,6 +73,7 @@ void PlannerOptions::describe(OptionTable& table) {
     table.add("clearance_margin", clearanceMargin, 0, 10, "m",
               "Kept to surfaces beyond the platform's clearance");
     table.add("targets", targets, 1, 10000, "", "Tears that candidate views are made for, a plan");
+    table.add("candidates", candidates, 1, 100000, "", "Views of tears that are scored, a plan");
     table.add("places", places, 0, 10000, "", "Places of candidate views that aim at no tear");
     table.add("surface_box", surfaceBox, 0, "m",
               "Surfaces lie in this box (xmin ymin zmin xmax ymax zmax) and the space around it is "

@@ -47,6 +47,7 @@ class Choice {
     }
     bool add(const Eigen::Vector3d& eye, const Eigen::Vector3d& target);
     void addAround(const RiftRecord& record, int directions);
+    void thinOut();
     void addTurns();
     void addPlaces();
     void addPool();
@@ -118,6 +119,17 @@ void Choice::addAround(const RiftRecord& record, int directions) {
     }
 }
 
+/// As many candidates at tears as one plan has time for, by lot.
+void Choice::thinOut() {
+    const auto most = static_cast<std::size_t>(k_.options().candidates);
+    for (std::size_t i = 0; i < most && i < candidates_.size(); ++i) {
+        std::swap(candidates_[i], candidates_[i + random_() % (candidates_.size() - i)]);
+    }
+    if (candidates_.size() > most) {
+        candidates_.resize(most);
+    }
+}
+
 /// Turning where the camera is costs no way.
 void Choice::addTurns() {
     const Eigen::Vector3d eye = k_.camera().translation;
@@ -136,7 +148,7 @@ void Choice::addPlaces() {
     if (box) {
         // Around an object: from all sides, at distances from which much of it is in view.
         const double radius = box->diagonal().norm() / 2;
-        for (int i = 0; i < 3 * k_.options().places; ++i) {
+        for (int i = 0; i < 2 * k_.options().places; ++i) {
             const double z = uniform(-1, 1);
             const double a = uniform(0, 2 * kPi);
             const double r = std::sqrt(1 - z * z);
@@ -282,15 +294,15 @@ std::optional<ViewPlan> Choice::lastResorts(double minGain) {
         const bool reachable = !candidates_.empty();
         const Eigen::Vector3d p = record->cell.openPosition.cast<double>();
         std::erase_if(candidates_, [&](const Candidate& c) {
-            return scorer_.quality(*record, c.pose.translation) < 0.05 ||
+            return scorer_.benefit(*record, c.pose.translation).quality < 0.1 ||
                    !lineOfSight(c.pose.translation, p);
         });
         const bool visible = !candidates_.empty();
         if (candidates_.size() > 12) {
             std::stable_sort(candidates_.begin(), candidates_.end(),
                              [&](const Candidate& a, const Candidate& b) {
-                                 return scorer_.quality(*record, a.pose.translation) >
-                                        scorer_.quality(*record, b.pose.translation);
+                                 return scorer_.benefit(*record, a.pose.translation).area >
+                                        scorer_.benefit(*record, b.pose.translation).area;
                              });
             candidates_.resize(12);
         }
@@ -324,6 +336,7 @@ std::optional<ViewPlan> Choice::make() {
     for (std::size_t i = random_() % stride; i < open.size(); i += stride) {
         addAround(*open[i], 5);
     }
+    thinOut();
     addTurns();
     addPlaces();
     addPool();

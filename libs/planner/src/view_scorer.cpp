@@ -56,9 +56,10 @@ ViewScorer::ViewScorer(const SensorModel& sensor, const SurfaceSummary& summary,
     }
 }
 
-double ViewScorer::quality(const RiftRecord& record, const Eigen::Vector3d& eye) const {
+ViewScorer::Benefit ViewScorer::benefit(const RiftRecord& record,
+                                        const Eigen::Vector3d& eye) const {
     if (RiftLedger::tried(record, eye)) {
-        return 0.0;
+        return {};
     }
     const Eigen::Vector3d ray = eye - record.cell.openPosition.cast<double>();
     const double distance = ray.norm();
@@ -73,8 +74,18 @@ double ViewScorer::quality(const RiftRecord& record, const Eigen::Vector3d& eye)
         angle = ray.dot(facing.normalized()) / distance;
     }
     const double angleQuality = std::clamp((angle - 0.2) / 0.35, 0.0, 1.0);
-    const double depthQuality = distance <= goodDepth_ ? 1.0 : std::pow(goodDepth_ / distance, 2);
-    return angleQuality * depthQuality * std::pow(0.6, record.attempts.size());
+    // New surface is worth something from afar too; known surface gets better only from where the
+    // view measures well.
+    const double torn = distance <= goodDepth_ ? 1.0 : std::pow(goodDepth_ / distance, 2);
+    const double coarse = std::clamp((1.6 * goodDepth_ - distance) / (0.6 * goodDepth_), 0.0, 1.0);
+    const double vain = std::pow(0.6, record.attempts.size());
+    const double cell = summary_->cellSize();
+    const double tornArea = static_cast<double>(record.cell.rim) * weights_.reach * cell;
+    const auto coarseArea = static_cast<double>(record.cell.coarse);
+    Benefit result;
+    result.area = angleQuality * vain * (torn * tornArea + coarse * coarseArea);
+    result.quality = angleQuality * (tornArea > 0.3 * coarseArea ? torn : coarse);
+    return result;
 }
 
 ViewScorer::DepthBuffer ViewScorer::draw(const Pose& camera_T_world,
@@ -181,8 +192,8 @@ ViewScore ViewScorer::score(const Pose& world_T_camera) const {
                 uv.y() < kMargin || uv.y() > camera.height - 1 - kMargin) {
                 continue;
             }
-            const double q = quality(record, world_T_camera.translation);
-            if (q <= 0) {
+            const Benefit b = benefit(record, world_T_camera.translation);
+            if (b.area <= 0) {
                 continue;
             }
             const int column = std::clamp(static_cast<int>(uv.x()) / kPixels, 0, buffer.width - 1);
@@ -190,10 +201,8 @@ ViewScore ViewScorer::score(const Pose& world_T_camera) const {
             if (static_cast<double>(buffer.at(column, row)) < p.z() - 2.0 * cell) {
                 continue;
             }
-            const double area = static_cast<double>(record.cell.rim) * weights_.reach * cell +
-                                static_cast<double>(record.cell.coarse);
-            result.openGain += q * area;
-            if (q > 0.3) {
+            result.openGain += b.area;
+            if (b.quality > 0.25) {
                 result.cells.push_back(record.cell.key);
             }
         }

@@ -38,8 +38,12 @@ class ViewScorer {
     ViewScore score(const Pose& world_T_camera) const;
     /// Unknown places that the view would look into.
     std::vector<Eigen::Vector3d> unknownSeen(const Pose& world_T_camera) const;
-    /// Quality of seeing this open cell from there, 0 (not at all) to 1, without occlusion.
-    double quality(const RiftRecord& record, const Eigen::Vector3d& eye) const;
+    /// Area that seeing this open cell from there would bring, without occlusion [m^2], and the
+    /// quality of that view of it, 0 (in vain) to 1.
+    struct Benefit {
+        double area = 0, quality = 0;
+    };
+    Benefit benefit(const RiftRecord& record, const Eigen::Vector3d& eye) const;
 
     const std::vector<const RiftRecord*>& open() const { return open_; }
 
