@@ -299,7 +299,7 @@ YamlMap ExploreRun::figures(const std::string& error) {
             summary.set("spurious_" + d, f.spurious);
         }
         summary.set("accuracy_headline",
-                    program_.coverage.at_delta(judge_->headline()).accuracy);
+                    program_.coverage.atDelta(judge_->headline()).accuracy);
         summary.set("error_median_m", program_.coverage.errorMedian);
         summary.set("error_p95_m", program_.coverage.errorP95);
         summary.set("explained", program_.coverage.explained);
