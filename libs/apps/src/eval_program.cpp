@@ -250,14 +250,15 @@ void EvalProgram::run() {
     meshArea = judge.meshArea();
     mapArea = map.area;
     report = judge.evaluate(map.points, map.normals, map.rifts ? &*map.rifts : nullptr);
+    std::optional<OctomapCheck> voxels;
     if (!rawlog_.empty()) {
-        check(map, judge);
+        voxels = check(map, judge);
     }
-    write(map, judge, platform, directory);
+    write(map, judge, platform, directory, voxels ? &*voxels : nullptr);
     print();
 }
 
-void EvalProgram::check(const Map& map, const CoverageJudge& judge) {
+OctomapCheck EvalProgram::check(const Map& map, const CoverageJudge& judge) {
     OctomapCheck check(judge_.octomapResolution > 0 ? judge_.octomapResolution : judge.headline());
     RawlogReader reader(rawlog_, input_);
     ViewBuilder builder(stereo_);
@@ -274,10 +275,12 @@ void EvalProgram::check(const Map& map, const CoverageJudge& judge) {
         }
     }
     octomap = check.compare(map.points, surface);
+    return check;
 }
 
 void EvalProgram::write(const Map& map, const CoverageJudge& judge,
-                        const SimulatedPlatform& platform, const RunDirectory& directory) {
+                        const SimulatedPlatform& platform, const RunDirectory& directory,
+                        const OctomapCheck* voxels) {
     YamlMap summary;
     summary.set("world", platform.world().name);
     char hash[32];
@@ -309,9 +312,12 @@ void EvalProgram::write(const Map& map, const CoverageJudge& judge,
     }
     writeSamples(directory.file("samples.ply"), judge, judge.sampleDistances(map.points));
     if (judge_.pictures) {
-        CoveragePictures(judge, platform.world().mesh, platform.rayCaster(), map.points,
-                         map.normals)
-            .write(directory.path(), judge.vertexErrors(map.points));
+        const CoveragePictures pictures(judge, platform.world().mesh, platform.rayCaster(),
+                                        map.points, map.normals);
+        pictures.write(directory.path(), judge.vertexErrors(map.points));
+        if (voxels != nullptr) {
+            pictures.writeOwners(directory.path(), voxels->owners(map.points));
+        }
     }
 }
 

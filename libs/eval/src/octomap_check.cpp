@@ -219,6 +219,22 @@ OctomapComparison OctomapCheck::compare(std::span<const Eigen::Vector3f> vertice
     return impl_->compare(vertices, surface);
 }
 
+std::function<VoxelOwner(const Eigen::Vector3f&)> OctomapCheck::owners(
+    std::span<const Eigen::Vector3f> vertices) const {
+    const auto ours = std::make_shared<const VoxelSet>(impl_->tree(), vertices);
+    return [ours, impl = impl_.get()](const Eigen::Vector3f& p) {
+        Key key;
+        if (!impl->tree().coordToKeyChecked(p.x(), p.y(), p.z(), key)) {
+            return VoxelOwner::kNeither;
+        }
+        const bool theirs = impl->occupied(key);
+        if (ours->contains(key)) {
+            return theirs ? VoxelOwner::kBoth : VoxelOwner::kOnlyOurs;
+        }
+        return theirs ? VoxelOwner::kOnlyOctomap : VoxelOwner::kNeither;
+    };
+}
+
 bool OctomapCheck::occupied(const Eigen::Vector3f& point) const {
     Key key;
     return impl_->tree().coordToKeyChecked(point.x(), point.y(), point.z(), key) &&

@@ -25,6 +25,8 @@ const cv::Vec3d kCovered(95, 170, 85);
 const cv::Vec3d kUncovered(40, 45, 225);
 const cv::Vec3d kUnobservable(190, 165, 150);
 const cv::Vec3d kFaint(225, 225, 225);
+const cv::Vec3d kOnlyOctomap(210, 120, 40);
+const cv::Vec3d kOnlyOurs(40, 150, 245);
 
 cv::Vec3b shaded(const cv::Vec3d& colour, double shade) {
     const cv::Vec3d c = colour * (0.45 + 0.55 * shade);
@@ -252,6 +254,41 @@ cv::Mat CoveragePictures::errors(std::size_t viewpoint, std::span<const float> v
                      {heat(3), metres(3 * delta) + " and more"},
                      {kFaint, "the world, no vertex"}});
     return picture;
+}
+
+cv::Mat CoveragePictures::owners(std::size_t viewpoint,
+                                 const std::function<VoxelOwner(const Eigen::Vector3f&)>& ownerOf,
+                                 int width, int height) const {
+    cv::Mat picture = paint(eyes_.at(viewpoint), width, height, nullptr, [&](const Seen& seen) {
+        if (!seen.observable) {
+            return shaded(kUnobservable, seen.shade);
+        }
+        switch (ownerOf(seen.point.cast<float>())) {
+            case VoxelOwner::kBoth:
+                return shaded(kFaint, seen.shade);
+            case VoxelOwner::kOnlyOctomap:
+                return shaded(kOnlyOctomap, seen.shade);
+            case VoxelOwner::kOnlyOurs:
+                return shaded(kOnlyOurs, seen.shade);
+            case VoxelOwner::kNeither:
+                break;
+        }
+        return shaded(kUncovered, seen.shade);
+    });
+    legend(picture, {{kFaint, "voxel of both"},
+                     {kOnlyOctomap, "only OctoMap's"},
+                     {kOnlyOurs, "only ours"},
+                     {kUncovered, "of neither"},
+                     {kUnobservable, "not observable"}});
+    return picture;
+}
+
+void CoveragePictures::writeOwners(
+    const std::filesystem::path& directory,
+    const std::function<VoxelOwner(const Eigen::Vector3f&)>& ownerOf) const {
+    for (std::size_t i = 0; i < viewpoints(); ++i) {
+        writePng(directory / ("octomap_" + std::to_string(i) + ".png"), owners(i, ownerOf));
+    }
 }
 
 void CoveragePictures::write(const std::filesystem::path& directory,

@@ -46,9 +46,9 @@ class EvalProgram : public Program {
 
     Map readMap() const;
     std::vector<Eigen::Vector3f> readRifts(const std::filesystem::path& file) const;
-    void check(const Map& map, const CoverageJudge& judge);
+    OctomapCheck check(const Map& map, const CoverageJudge& judge);
     void write(const Map& map, const CoverageJudge& judge, const SimulatedPlatform& platform,
-               const RunDirectory& directory);
+               const RunDirectory& directory, const OctomapCheck* voxels);
     void print() const;
 
     SimulationOptions simulation_;

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <functional>
 #include <memory>
 #include <span>
 #include <vector>
@@ -41,6 +42,9 @@ struct OctomapComparison {
     double ourCoverageNear() const;
 };
 
+/// Who has a voxel.
+enum class VoxelOwner { kNeither, kBoth, kOnlyOctomap, kOnlyOurs };
+
 /// The cross-check of coverage_protocol.md with liboctomap itself (not MRPT's wrapping of it).
 /// Not thread-safe.
 class OctomapCheck {
@@ -59,6 +63,11 @@ class OctomapCheck {
     /// `surface`: ground-truth samples (the observable ones), or empty.
     OctomapComparison compare(std::span<const Eigen::Vector3f> vertices,
                               std::span<const Eigen::Vector3f> surface) const;
+
+    /// Tells who has the voxel of a point. Valid as long as this object; thread-safe while nothing
+    /// is inserted.
+    std::function<VoxelOwner(const Eigen::Vector3f&)> owners(
+        std::span<const Eigen::Vector3f> vertices) const;
 
     /// True if the voxel of this point is occupied.
     bool occupied(const Eigen::Vector3f& point) const;

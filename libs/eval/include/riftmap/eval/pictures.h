@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <opencv2/core/mat.hpp>
 #include <optional>
 #include <span>
@@ -11,6 +12,7 @@
 
 #include "riftmap/core/pose.h"
 #include "riftmap/eval/coverage.h"
+#include "riftmap/eval/octomap_check.h"
 #include "riftmap/eval/point_index.h"
 
 namespace riftmap {
@@ -37,6 +39,15 @@ class CoveragePictures {
     cv::Mat errors(std::size_t viewpoint, std::span<const float> vertexErrors, int width = 960,
                    int height = 720) const;
 
+    /// The observable surface by who has its voxel: both light grey, only the OctoMap blue, only we
+    /// orange, neither red. 8-bit BGR.
+    cv::Mat owners(std::size_t viewpoint,
+                   const std::function<VoxelOwner(const Eigen::Vector3f&)>& ownerOf,
+                   int width = 960, int height = 720) const;
+
+    /// octomap_N.png into the directory.
+    void writeOwners(const std::filesystem::path& directory,
+                     const std::function<VoxelOwner(const Eigen::Vector3f&)>& ownerOf) const;
     /// coverage_N.png and error_N.png into the directory.
     void write(const std::filesystem::path& directory, std::span<const float> vertexErrors) const;
 
