@@ -188,12 +188,17 @@ class NearGuard {
         coarse.window = std::min(options.window, 7);
         coarse.semiGlobal = false;
         coarse.subpixel = true;
+        coarse.uniqueness = 10;
+        coarse.leftRightCheck = true;
+        coarse.leftRightTolerance = 1;
         if (options.guard <= 0 || image.width < 2 * kCoarse || image.height < 2 * kCoarse) {
             return;
         }
         shrink(pair.left, left_);
         shrink(pair.right, right_);
         level_.match(coarse, left_, right_, 0, found_);
+        // A wrong match here would cost true ones there: it must not stand alone.
+        isolated_.apply(found_, kLeastSurface, 1.0F);
         discard(image);
     }
 
@@ -218,7 +223,10 @@ class NearGuard {
         }
     }
 
+    static constexpr int kLeastSurface = 24;  ///< [coarse px]
+
     Level level_;
+    IsolatedFilter isolated_;
     cv::Mat left_, right_;
     DisparityImage found_;
 };

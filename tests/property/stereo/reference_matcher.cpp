@@ -274,34 +274,7 @@ Image shrunk(const Image& image) {
     return out;
 }
 
-void guard(const Image& left, const Image& right, const StereoOptions& o, DisparityImage& out) {
-    if (o.guard == 0 || left.width < 8 || left.height < 8) {
-        return;
-    }
-    StereoOptions coarse = o;
-    coarse.minDisparity = static_cast<int>(std::floor(o.minDisparity / 4.0));
-    const int end = o.minDisparity + o.numDisparities + o.guard;
-    coarse.numDisparities = static_cast<int>(std::ceil(end / 4.0)) + 2 - coarse.minDisparity;
-    coarse.window = std::min(7, o.window);
-    coarse.semiGlobal = false;
-    coarse.subpixel = true;
-    const DisparityImage found = level(shrunk(left), shrunk(right), coarse, 0);
-    const auto tooNear = [&](int x, int y) {
-        return x >= 0 && y >= 0 && x < found.width && y < found.height && found.valid(x, y) &&
-               found.at(x, y) * 4 >= static_cast<float>(o.minDisparity + o.numDisparities);
-    };
-    for (int y = 0; y < out.height; ++y) {
-        for (int x = 0; x < out.width; ++x) {
-            for (int k = 0; k < 9; ++k) {
-                if (tooNear(x / 4 + k % 3 - 1, y / 4 + k / 3 - 1)) {
-                    out.disparity[out.index(x, y)] = kNoDisparity;
-                }
-            }
-        }
-    }
-}
-
-void removeIsolated(DisparityImage& image, const StereoOptions& o) {
+void removeIsolated(DisparityImage& image, int minSize, float maxDifference) {
     std::vector<char> seen(image.disparity.size(), 0);
     for (int y = 0; y < image.height; ++y) {
         for (int x = 0; x < image.width; ++x) {
@@ -317,16 +290,46 @@ void removeIsolated(DisparityImage& image, const StereoOptions& o) {
                 for (const auto& [s, t] : around) {
                     if (s >= 0 && t >= 0 && s < image.width && t < image.height &&
                         image.valid(s, t) && seen[image.index(s, t)] == 0 &&
-                        std::abs(image.at(s, t) - image.at(u, v)) <=
-                            static_cast<float>(o.isolatedDifference)) {
+                        std::abs(image.at(s, t) - image.at(u, v)) <= maxDifference) {
                         seen[image.index(s, t)] = 1;
                         group.emplace_back(s, t);
                     }
                 }
             }
-            if (group.size() < static_cast<std::size_t>(o.isolatedSize)) {
+            if (group.size() < static_cast<std::size_t>(minSize)) {
                 for (const auto& [u, v] : group) {
                     image.disparity[image.index(u, v)] = kNoDisparity;
+                }
+            }
+        }
+    }
+}
+
+void guard(const Image& left, const Image& right, const StereoOptions& o, DisparityImage& out) {
+    if (o.guard == 0 || left.width < 8 || left.height < 8) {
+        return;
+    }
+    StereoOptions coarse = o;
+    coarse.minDisparity = static_cast<int>(std::floor(o.minDisparity / 4.0));
+    const int end = o.minDisparity + o.numDisparities + o.guard;
+    coarse.numDisparities = static_cast<int>(std::ceil(end / 4.0)) + 2 - coarse.minDisparity;
+    coarse.window = std::min(7, o.window);
+    coarse.semiGlobal = false;
+    coarse.subpixel = true;
+    coarse.uniqueness = 10;
+    coarse.leftRightCheck = true;
+    coarse.leftRightTolerance = 1;
+    DisparityImage found = level(shrunk(left), shrunk(right), coarse, 0);
+    removeIsolated(found, 24, 1.0F);
+    const auto tooNear = [&](int x, int y) {
+        return x >= 0 && y >= 0 && x < found.width && y < found.height && found.valid(x, y) &&
+               found.at(x, y) * 4 >= static_cast<float>(o.minDisparity + o.numDisparities);
+    };
+    for (int y = 0; y < out.height; ++y) {
+        for (int x = 0; x < out.width; ++x) {
+            for (int k = 0; k < 9; ++k) {
+                if (tooNear(x / 4 + k % 3 - 1, y / 4 + k / 3 - 1)) {
+                    out.disparity[out.index(x, y)] = kNoDisparity;
                 }
             }
         }
@@ -357,7 +360,7 @@ DisparityImage match(const cv::Mat& left, const cv::Mat& right, const StereoOpti
     const int last = o.minDisparity + o.numDisparities - 1;
     DisparityImage out = level(l, r, o, std::clamp(last, 0, l.width));
     guard(l, r, o, out);
-    removeIsolated(out, o);
+    removeIsolated(out, o.isolatedSize, static_cast<float>(o.isolatedDifference));
     discardSilhouettes(out, o);
     return out;
 }
