@@ -118,7 +118,7 @@ Eigen::Vector3f MipMap::sample(float u, float v, float footprint) const {
         ++level;
     }
     const float between = std::clamp(footprint / texels - 1, 0.0F, 1.0F);
-    const Eigen::Vector3f fine = bilinear(level, u, v);
+    Eigen::Vector3f fine = bilinear(level, u, v);
     if (between == 0 || level + 1 == levels_.size()) {
         return fine;
     }

@@ -143,7 +143,7 @@ Hit makeHit(const Eigen::Vector3d& corner, const Eigen::Vector3d& normal,
 
 std::optional<Hit> RayCaster::cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
                                    double tMax) const {
-    RTCIntersectContext context;
+    RTCIntersectContext context{};
     rtcInitIntersectContext(&context);
     RTCRayHit query{};
     query.ray = makeRay(origin, direction, 0, tMax);
@@ -160,7 +160,7 @@ std::optional<Hit> RayCaster::cast(const Eigen::Vector3d& origin, const Eigen::V
 
 void RayCaster::cast4(const Eigen::Vector3d& origin, const Eigen::Vector3d* directions,
                       std::size_t count, std::optional<Hit>* hits) const {
-    RTCIntersectContext context;
+    RTCIntersectContext context{};
     rtcInitIntersectContext(&context);
     context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
     alignas(16) RTCRayHit4 query{};
@@ -198,7 +198,7 @@ bool RayCaster::occluded(const Eigen::Vector3d& a, const Eigen::Vector3d& b, dou
     if (length <= 2 * margin) {
         return false;
     }
-    RTCIntersectContext context;
+    RTCIntersectContext context{};
     rtcInitIntersectContext(&context);
     RTCRay ray = makeRay(a, d, margin / length, 1 - margin / length);
     rtcOccluded1(scene_->scene, &context, &ray);
@@ -212,8 +212,8 @@ template <class SceneT>
 struct Search {
     const SceneT& scene;
     Eigen::Vector3d a, b;  ///< the segment; a == b for a point
-    double best;           ///< [m]
-    double slack;          ///< radius of the query beyond `best`
+    double best = 0;       ///< [m]
+    double slack = 0;      ///< radius of the query beyond `best`
     std::optional<std::uint32_t> triangle;
     Eigen::Vector3d point;
 };
@@ -268,7 +268,7 @@ RTCPointQuery makeQuery(const Eigen::Vector3d& p, double radius) {
 
 std::optional<Closest> RayCaster::closest(const Eigen::Vector3d& point, double maxDistance) const {
     const double slack = roundingOf(point);
-    RTCPointQueryContext context;
+    RTCPointQueryContext context{};
     rtcInitPointQueryContext(&context);
     RTCPointQuery query = makeQuery(point, maxDistance + slack);
     Search<Scene> search{*scene_, point, point, maxDistance, slack, std::nullopt, point};
@@ -290,7 +290,7 @@ double RayCaster::sweptDistance(const Eigen::Vector3d& a, const Eigen::Vector3d&
         const Eigen::Vector3d q = a + (b - a) * (static_cast<double>(i + 1) / pieces);
         const Eigen::Vector3d middle = (p + q) / 2;
         const double slack = (q - p).norm() / 2 + roundingOf(middle);
-        RTCPointQueryContext context;
+        RTCPointQueryContext context{};
         rtcInitPointQueryContext(&context);
         RTCPointQuery query = makeQuery(middle, best + slack);
         Search<Scene> search{*scene_, p, q, best, slack, std::nullopt, p};

@@ -311,8 +311,10 @@ void StereoRenderer::Parts::smoothEdges(const Pose& pose, const std::vector<Pixe
         if (onEdge(seen, column, row)) {
             columns.push_back(column);
             for (int k = 0; k < n * n; ++k) {
-                b.pixels.emplace_back(column + (k % n + 0.5) / n - 0.5,
-                                      row + (k / n + 0.5) / n - 0.5);
+                const int across = k % n;
+                const int down = k / n;
+                b.pixels.emplace_back(column + (across + 0.5) / n - 0.5,
+                                      row + (down + 0.5) / n - 0.5);
             }
         }
     }
@@ -321,7 +323,7 @@ void StereoRenderer::Parts::smoothEdges(const Pose& pose, const std::vector<Pixe
     }
     cast(pose, b);
     shade(pose, b, true);
-    const auto samples = static_cast<std::size_t>(n * n);
+    const auto samples = static_cast<std::size_t>(n) * static_cast<std::size_t>(n);
     for (std::size_t i = 0; i < columns.size(); ++i) {
         Eigen::Vector3f sum = Eigen::Vector3f::Zero();
         for (std::size_t k = 0; k < samples; ++k) {
