@@ -87,14 +87,22 @@ std::vector<Run> runs(const std::string& keep) {
         Run run;
         run.name = w.name + "." + noise + "." + planner + "." + std::to_string(start);
         run.arguments = {std::string(RIFTMAP_SOURCE_DIR) + "/config/" + w.config,
-                         "--set", "Noise.level=" + noise,
-                         "--set", "Explore.planner=" + planner,
-                         "--set", "Platform.start_index=" + std::to_string(start),
-                         "--set", "Eval.cache=" + keep + "/observable",
-                         "--set", "Explore.rawlog=false",
-                         "--seed", std::to_string(start),
-                         "--no-progress", "-w",
-                         "--out", keep + "/" + run.name};
+                         "--set",
+                         "Noise.level=" + noise,
+                         "--set",
+                         "Explore.planner=" + planner,
+                         "--set",
+                         "Platform.start_index=" + std::to_string(start),
+                         "--set",
+                         "Eval.cache=" + keep + "/observable",
+                         "--set",
+                         "Explore.rawlog=false",
+                         "--seed",
+                         std::to_string(start),
+                         "--no-progress",
+                         "-w",
+                         "--out",
+                         keep + "/" + run.name};
         for (const std::string& set : w.sets) {
             run.arguments.insert(run.arguments.end(), {"--set", set});
         }
@@ -119,11 +127,8 @@ std::vector<Run> runs(const std::string& keep) {
         const bool compared = w.name == "room" || w.name == "rooms" || w.name == "bunny";
         for (int start = 0; compared && start < 3; ++start) {
             add(w, "N0", "paper", start);
-            for (const char* planner :
-                 w.object ? std::initializer_list<const char*>{"sphere", "random"}
-                          : std::initializer_list<const char*>{"octomap_frontier", "random"}) {
-                add(w, "N0", planner, start);
-            }
+            add(w, "N0", w.object ? "sphere" : "octomap_frontier", start);
+            add(w, "N0", "random", start);
         }
     }
     return table;
