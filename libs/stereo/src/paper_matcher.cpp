@@ -188,9 +188,6 @@ class NearGuard {
         coarse.window = std::min(options.window, 7);
         coarse.semiGlobal = false;
         coarse.subpixel = true;
-        coarse.uniqueness = 10;
-        coarse.leftRightCheck = true;
-        coarse.leftRightTolerance = 1;
         if (options.guard <= 0 || image.width < 2 * kCoarse || image.height < 2 * kCoarse) {
             return;
         }
@@ -205,7 +202,7 @@ class NearGuard {
  private:
     /// Discards what lies in or beside a coarse pixel whose surface is too near.
     void discard(DisparityImage& image) const {
-        const float beyond = image.maxDisparity + 1;
+        const float beyond = image.maxDisparity + 1.5F;
         for (int r = 0; r < found_.height; ++r) {
             for (int c = 0; c < found_.width; ++c) {
                 if (found_.valid(c, r) && found_.at(c, r) * kCoarse >= beyond) {
@@ -223,7 +220,7 @@ class NearGuard {
         }
     }
 
-    static constexpr int kLeastSurface = 24;  ///< [coarse px]
+    static constexpr int kLeastSurface = 12;  ///< [coarse px]
 
     Level level_;
     IsolatedFilter isolated_;

@@ -316,14 +316,11 @@ void guard(const Image& left, const Image& right, const StereoOptions& o, Dispar
     coarse.window = std::min(7, o.window);
     coarse.semiGlobal = false;
     coarse.subpixel = true;
-    coarse.uniqueness = 10;
-    coarse.leftRightCheck = true;
-    coarse.leftRightTolerance = 1;
     DisparityImage found = level(shrunk(left), shrunk(right), coarse, 0);
-    removeIsolated(found, 24, 1.0F);
+    removeIsolated(found, 12, 1.0F);
     const auto tooNear = [&](int x, int y) {
         return x >= 0 && y >= 0 && x < found.width && y < found.height && found.valid(x, y) &&
-               found.at(x, y) * 4 >= static_cast<float>(o.minDisparity + o.numDisparities);
+               found.at(x, y) * 4 >= static_cast<float>(o.minDisparity + o.numDisparities) + 0.5F;
     };
     for (int y = 0; y < out.height; ++y) {
         for (int x = 0; x < out.width; ++x) {

@@ -65,7 +65,7 @@ TEST_P(PaperMatcherOn, UnrelatedNoiseMatchesHardlyAnything) {
     cv::RNG rng(5);
     rng.fill(left, cv::RNG::UNIFORM, 0, 256);
     rng.fill(right, cv::RNG::UNIFORM, 0, 256);
-    EXPECT_LT(matchedPercent(left, right), 1.0);
+    EXPECT_LT(matchedPercent(left, right), GetParam().semiGlobal ? 2.0 : 0.5);
 }
 
 /// Not promised by the semi-global pass, which carries on along the row what came before.
@@ -123,7 +123,7 @@ TEST_P(PaperMatcherOn, SurfaceInTheRangeStaysBesideANearerOne) {
         }
     }
     // The semi-global pass carries the far surface a little further into the near one.
-    EXPECT_LT(invented, box.area() / (GetParam().semiGlobal ? 50 : 100));
+    EXPECT_LT(invented, box.area() * (GetParam().semiGlobal ? 3 : 1) / 100);
     EXPECT_GT(farMatched, farPixels * 95 / 100);
 }
 
