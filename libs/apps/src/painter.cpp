@@ -209,7 +209,7 @@ void Painter::overlayArrow(const Eigen::Vector3d& from, const Eigen::Vector3d& t
 }
 
 void Painter::overlayCamera(const Pose& world_T_camera, double size, double thickness,
-                            const cv::Scalar& colour, bool filled) {
+                            const cv::Scalar& colour) {
     const double w = 0.5 * size;
     const double h = 0.36 * size;
     const std::vector<Eigen::Vector3d> corners = {world_T_camera * Eigen::Vector3d(-w, -h, size),
@@ -217,17 +217,6 @@ void Painter::overlayCamera(const Pose& world_T_camera, double size, double thic
                                                   world_T_camera * Eigen::Vector3d(w, h, size),
                                                   world_T_camera * Eigen::Vector3d(-w, h, size)};
     const auto& apex = world_T_camera.translation;
-    std::vector<cv::Point> face;
-    for (const auto& corner : corners) {
-        const Eigen::Vector3d q = project(corner);
-        if (!(q.z() > kNear) || !(project(apex).z() > kNear)) {
-            return;
-        }
-        face.push_back(fixedPoint(q));
-    }
-    if (filled) {
-        cv::fillConvexPoly(canvas_, face, colour, cv::LINE_AA, kShift);
-    }
     for (std::size_t i = 0; i < 4; ++i) {
         overlayLine(corners[i], corners[(i + 1) % 4], thickness, colour);
         overlayLine(apex, corners[i], thickness, colour);

@@ -33,7 +33,7 @@ class Painter {
                       const cv::Scalar& colour);
     /// The pyramid of a camera, `size` deep [m].
     void overlayCamera(const Pose& world_T_camera, double size, double thickness,
-                       const cv::Scalar& colour, bool filled);
+                       const cv::Scalar& colour);
     /// White text on a dark strip at the bottom.
     void caption(const std::string& text);
 

@@ -166,6 +166,17 @@ void drawSurface(Painter& painter, const PixelGraph& graph, const std::vector<Ve
     });
 }
 
+/// Cameras of a long drive must not hide one another.
+double cameraSize(const Extent& extent, const MapPictureParts& parts) {
+    double driven = 0;
+    for (std::size_t i = 1; i < parts.taken.size(); ++i) {
+        driven += (parts.taken[i].translation - parts.taken[i - 1].translation).norm();
+    }
+    const double size = 0.09 * extent.radius;
+    constexpr double kShown = 12;
+    return driven > size ? std::min(size, 0.6 * driven / kShown) : size;
+}
+
 void drawCameras(Painter& painter, const MapPictureParts& parts, double size) {
     for (std::size_t i = 1; i < parts.taken.size(); ++i) {
         painter.overlayLine(parts.taken[i - 1].translation, parts.taken[i].translation, 1.5,
@@ -174,7 +185,7 @@ void drawCameras(Painter& painter, const MapPictureParts& parts, double size) {
     // Not every camera of a long recording.
     const std::size_t step = std::max<std::size_t>(1, parts.taken.size() / 12);
     for (std::size_t i = 0; i < parts.taken.size(); i += step) {
-        painter.overlayCamera(parts.taken[i], size, 1.2, kDarkGreen, false);
+        painter.overlayCamera(parts.taken[i], size, 1.2, kDarkGreen);
     }
     if (!parts.taken.empty() && !parts.planned.empty()) {
         painter.overlayLine(parts.taken.back().translation, parts.planned.front().translation, 3.0,
@@ -186,10 +197,10 @@ void drawCameras(Painter& painter, const MapPictureParts& parts, double size) {
     }
     const std::size_t plannedStep = std::max<std::size_t>(1, parts.planned.size() / 6);
     for (std::size_t i = 0; i < parts.planned.size(); i += plannedStep) {
-        painter.overlayCamera(parts.planned[i], 0.8 * size, 1.2, kGreen, false);
+        painter.overlayCamera(parts.planned[i], 0.8 * size, 1.2, kGreen);
     }
     if (!parts.planned.empty()) {
-        painter.overlayCamera(parts.planned.back(), size, 2.0, kGreen, true);
+        painter.overlayCamera(parts.planned.back(), size, 3.0, kGreen);
     }
 }
 
@@ -258,7 +269,7 @@ cv::Mat mapPicture(const PixelGraph& graph, const MapPictureParts& parts, int wi
         const Eigen::Vector3d along = rift.normal.cast<double>() * arrow * (dominant ? 2.0 : 1.0);
         painter.overlayArrow(from, from + along, dominant ? 4.0 : 2.0, dominant ? kRed : kBlue);
     }
-    drawCameras(painter, parts, 0.09 * extent.radius);
+    drawCameras(painter, parts, cameraSize(extent, parts));
     std::string text = std::to_string(graph.vertexCount()) + " vertices, " +
                        std::to_string(parts.rifts.size()) + " rifts";
     if (shown.size() < parts.rifts.size()) {

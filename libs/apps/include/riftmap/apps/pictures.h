@@ -23,7 +23,7 @@ struct MapPictureParts {
     std::vector<Rift> rifts;              ///< arrows along their normals, blue
     std::optional<std::size_t> dominant;  ///< index into rifts: its arrow and vertices in red
     std::vector<Pose> taken;              ///< poses of views, green line with small cameras
-    std::vector<Pose> planned;            ///< the way planned, green, its last camera filled
+    std::vector<Pose> planned;            ///< the way planned, brighter green, its last camera bold
     std::size_t maxArrows = 60;           ///< the largest rifts get one
 };
 
