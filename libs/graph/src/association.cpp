@@ -33,7 +33,9 @@ class Frustum {
         }
         offsets_ = {0, 0, 0, 0, -kNearest, farthest};
     }
-    bool meets(const std::array<float, 3>& min, const std::array<float, 3>& max) const {
+    bool meets(const Bounds& box) const {
+        const auto& min = box.min;
+        const auto& max = box.max;
         const Eigen::Vector3f low = Eigen::Vector3f(min[0], min[1], min[2]) - translation_;
         const Eigen::Vector3f high = Eigen::Vector3f(max[0], max[1], max[2]) - translation_;
         for (std::size_t i = 0; i < planes_.size(); ++i) {
@@ -101,12 +103,11 @@ void Association::cull(const GraphStorage& storage, const ViewPoints& view) {
     // A vertex known badly may match from behind the farthest pixel.
     const Frustum frustum(view, 1.5F * farthest_);
     for (const Block& block : storage.blocks()) {
-        if (block.vertices == 0 || !frustum.meets(block.min, block.max)) {
+        if (block.vertices == 0 || !frustum.meets(block.bounds)) {
             continue;
         }
         for (const std::uint32_t index : block.pages) {
-            const Page& page = storage.page(index);
-            if (page.alive != 0 && frustum.meets(page.min, page.max)) {
+            if (frustum.meets(storage.bounds(index))) {
                 pages.push_back(index);
             }
         }

@@ -8,21 +8,21 @@
 
 namespace riftmap {
 
-void Page::updateBounds() {
+namespace {
+
+constexpr Bounds emptyBounds() {
     constexpr float kInf = std::numeric_limits<float>::infinity();
-    min = {kInf, kInf, kInf};
-    max = {-kInf, -kInf, -kInf};
-    forEachBit(alive, [this](std::uint32_t s) {
-        min = {std::min(min[0], x[s]), std::min(min[1], y[s]), std::min(min[2], z[s])};
-        max = {std::max(max[0], x[s]), std::max(max[1], y[s]), std::max(max[2], z[s])};
-    });
+    return {{kInf, kInf, kInf}, {-kInf, -kInf, -kInf}};
 }
+
+}  // namespace
 
 GraphStorage::GraphStorage(double blockSize) : blockSize_(blockSize) {}
 
 GraphStorage::GraphStorage(const GraphStorage& other)
     : blockSize_(other.blockSize_),
       pageCount_(other.pageCount_),
+      bounds_(other.bounds_),
       freePages_(other.freePages_),
       blocks_(other.blocks_),
       blockOfKey_(other.blockOfKey_),
@@ -76,6 +76,7 @@ void GraphStorage::reservePages(std::uint32_t count) {
         }
         ++pageCount_;
     }
+    bounds_.resize(pageCount_, emptyBounds());
 }
 
 std::uint32_t GraphStorage::newPage(std::uint32_t block) {
@@ -143,22 +144,31 @@ void GraphStorage::removeVertex(VertexId id) {
     }
 }
 
-void GraphStorage::updateBounds(std::uint32_t block) {
-    constexpr float kInf = std::numeric_limits<float>::infinity();
+void GraphStorage::updatePageBounds(std::uint32_t index) {
+    const Page& p = page(index);
+    Bounds b = emptyBounds();
+    forEachBit(p.alive, [&](std::uint32_t s) {
+        b.min = {std::min(b.min[0], p.x[s]), std::min(b.min[1], p.y[s]),
+                 std::min(b.min[2], p.z[s])};
+        b.max = {std::max(b.max[0], p.x[s]), std::max(b.max[1], p.y[s]),
+                 std::max(b.max[2], p.z[s])};
+    });
+    bounds_[index] = b;
+}
+
+void GraphStorage::updateBlockBounds(std::uint32_t block) {
     Block& b = blocks_[block];
-    b.min = {kInf, kInf, kInf};
-    b.max = {-kInf, -kInf, -kInf};
+    b.bounds = emptyBounds();
     for (const std::uint32_t index : b.pages) {
-        const Page& p = page(index);
         for (std::size_t i = 0; i < 3; ++i) {
-            b.min[i] = std::min(b.min[i], p.min[i]);
-            b.max[i] = std::max(b.max[i], p.max[i]);
+            b.bounds.min[i] = std::min(b.bounds.min[i], bounds_[index].min[i]);
+            b.bounds.max[i] = std::max(b.bounds.max[i], bounds_[index].max[i]);
         }
     }
     for (std::size_t i = 0; i < 3 && !b.pages.empty(); ++i) {
         const double low = b.key[i] * blockSize_, high = low + blockSize_;
-        overhang_ = std::max(
-            {overhang_, low - static_cast<double>(b.min[i]), static_cast<double>(b.max[i]) - high});
+        overhang_ = std::max({overhang_, low - static_cast<double>(b.bounds.min[i]),
+                              static_cast<double>(b.bounds.max[i]) - high});
     }
 }
 
@@ -340,7 +350,7 @@ std::size_t GraphStorage::rebuild() {
             freePages_.push_back(index);
             continue;
         }
-        p.updateBounds();
+        updatePageBounds(index);
         const auto n = static_cast<std::uint32_t>(std::popcount(p.alive));
         blocks_[p.block].vertices += n;
         vertexCount_ += n;
@@ -360,7 +370,7 @@ std::size_t GraphStorage::rebuild() {
     }
     edgeCount_ = halfEdges / 2;
     for (std::uint32_t b = 0; b < blocks_.size(); ++b) {
-        updateBounds(b);
+        updateBlockBounds(b);
     }
     return broken.size();
 }

@@ -322,7 +322,7 @@ void Merger::fusePage(const View& view, GraphStorage& storage, std::uint32_t whi
         }
     });
     if (!paper()) {
-        page.updateBounds();
+        storage.updatePageBounds(seen_.pages[which]);
     }
 }
 
@@ -357,7 +357,7 @@ void Merger::deleteSeenThrough(GraphStorage& storage, RiftFinder& rifts, MergeRe
             ++result.deletedVertices;
         });
         if (work_[i].doomed != 0) {
-            storage.page(index).updateBounds();
+            storage.updatePageBounds(index);
         }
     }
 }
@@ -564,12 +564,12 @@ void Merger::finish(GraphStorage& storage, RiftFinder& rifts, std::int64_t& area
     std::sort(freshPages_.begin(), freshPages_.end());
     freshPages_.erase(std::unique(freshPages_.begin(), freshPages_.end()), freshPages_.end());
     parallelFor(freshPages_.size(), kPagesAtOnce,
-                [&](std::size_t i) { storage.page(freshPages_[i]).updateBounds(); });
+                [&](std::size_t i) { storage.updatePageBounds(freshPages_[i]); });
     std::sort(touchedBlocks_.begin(), touchedBlocks_.end());
     touchedBlocks_.erase(std::unique(touchedBlocks_.begin(), touchedBlocks_.end()),
                          touchedBlocks_.end());
     for (const std::uint32_t block : touchedBlocks_) {
-        storage.updateBounds(block);
+        storage.updateBlockBounds(block);
     }
 }
 

@@ -95,29 +95,45 @@ Vertex PixelGraph::vertex(VertexId id) const {
 
 std::optional<VertexId> PixelGraph::nearest(const Eigen::Vector3f& point, float radius) const {
     const Eigen::Vector3f reach = Eigen::Vector3f::Constant(radius);
+    const GraphStorage& s = storage();
+    // The page whose box is nearest first: it leaves little to look at in the others.
+    std::uint32_t first = GraphStorage::kNoBlock;
+    float nearestBox = radius * radius;
+    s.forEachBlockIn(point - reach, point + reach, [&](std::uint32_t block) {
+        for (const std::uint32_t index : s.blocks()[block].pages) {
+            const float outside = s.bounds(index).squaredDistance(point);
+            if (outside < nearestBox || first == GraphStorage::kNoBlock) {
+                nearestBox = outside;
+                first = index;
+            }
+        }
+    });
+    if (first == GraphStorage::kNoBlock) {
+        return std::nullopt;
+    }
     float least = radius * radius;
     VertexId found = kNoVertex;
-    forEachPageIn(point - reach, point + reach, [&](std::uint32_t index, const Page& page) {
-        float outside = 0;  // squared distance to the page's box
-        for (std::size_t i = 0; i < 3; ++i) {
-            const float p = point[static_cast<Eigen::Index>(i)];
-            const float d = std::max({0.0F, page.min[i] - p, p - page.max[i]});
-            outside += d * d;
-        }
-        if (outside > least) {
-            return;
-        }
-        forEachBit(page.alive, [&](std::uint32_t s) {
-            const float dx = page.x[s] - point.x();
-            const float dy = page.y[s] - point.y();
-            const float dz = page.z[s] - point.z();
+    const auto look = [&](std::uint32_t index) {
+        const Page& page = s.page(index);
+        forEachBit(page.alive, [&](std::uint32_t slot) {
+            const float dx = page.x[slot] - point.x();
+            const float dy = page.y[slot] - point.y();
+            const float dz = page.z[slot] - point.z();
             const float squared = dx * dx + dy * dy + dz * dz;
-            const VertexId id = GraphStorage::idOf(index, s);
+            const VertexId id = GraphStorage::idOf(index, slot);
             if (squared < least || (squared == least && id < found)) {
                 least = squared;
                 found = id;
             }
         });
+    };
+    look(first);
+    s.forEachBlockIn(point - reach, point + reach, [&](std::uint32_t block) {
+        for (const std::uint32_t index : s.blocks()[block].pages) {
+            if (index != first && s.bounds(index).squaredDistance(point) <= least) {
+                look(index);
+            }
+        }
     });
     return found == kNoVertex ? std::nullopt : std::optional<VertexId>(found);
 }

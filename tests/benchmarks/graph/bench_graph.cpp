@@ -253,7 +253,7 @@ double bandwidth() {
 int main(int argc, char** argv) {
     std::string csv;
     std::size_t vertices = 10'000'000;
-    std::size_t octomapViews = 7;
+    std::size_t octomapViews = 3;
     for (int i = 1; i < argc; ++i) {
         const std::string arg = argv[i];
         if (arg == "--csv" && i + 1 < argc) {

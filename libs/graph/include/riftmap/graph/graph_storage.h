@@ -4,6 +4,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cstddef>
@@ -32,6 +33,22 @@ enum VertexState : std::uint8_t {
     kEvidenceMask = 0x38,  ///<
 };
 
+/// Box of the map frame, borders included [m].
+struct Bounds {
+    std::array<float, 3> min{}, max{};
+    bool meets(const Eigen::Vector3f& low, const Eigen::Vector3f& high) const {
+        return min[0] <= high.x() && max[0] >= low.x() && min[1] <= high.y() && max[1] >= low.y() &&
+               min[2] <= high.z() && max[2] >= low.z();
+    }
+    /// Squared distance of a point, 0 inside.
+    float squaredDistance(const Eigen::Vector3f& p) const {
+        const float dx = std::max({0.0F, min[0] - p.x(), p.x() - max[0]});
+        const float dy = std::max({0.0F, min[1] - p.y(), p.y() - max[1]});
+        const float dz = std::max({0.0F, min[2] - p.z(), p.z() - max[2]});
+        return dx * dx + dy * dy + dz * dz;
+    }
+};
+
 /// 64 vertices of one block as arrays.
 struct Page {
     static constexpr std::uint32_t kSize = 64;
@@ -49,8 +66,6 @@ struct Page {
 
     std::uint64_t alive = 0;            ///< a bit a slot
     std::uint32_t block = 0xFFFFFFFFU;  ///< index of its block
-    std::array<float, 3> min{}, max{};  ///< bounds of its living vertices [m]
-
     Eigen::Vector3f position(std::uint32_t slot) const { return {x[slot], y[slot], z[slot]}; }
     /// False if no edge of the vertex is high; true if one may be. Free slots have weight 0.
     bool mayHaveHighEdge(std::uint32_t slot) const {
@@ -59,14 +74,12 @@ struct Page {
         return (codes & 0x8000800080008000ULL) != 0 || (state[slot] & kOverflow) != 0;
     }
     bool living(std::uint32_t slot) const { return ((alive >> slot) & 1U) != 0; }
-    /// Bounds from scratch.
-    void updateBounds();
 };
 
 /// A cube of space and the pages that hold its vertices.
 struct Block {
     std::array<std::int32_t, 3> key{};  ///< floor(position / blockSize) at creation of a vertex
-    std::array<float, 3> min{}, max{};  ///< bounds of its vertices [m]; fusion may leave the cube
+    Bounds bounds;                      ///< of its vertices; fusion may leave the cube
     std::vector<std::uint32_t> pages;   ///< ascending in age
     std::uint32_t vertices = 0;
 };
@@ -131,8 +144,12 @@ class GraphStorage {
     VertexId addVertex(std::uint32_t block);
     /// Deletes a vertex with its edges.
     void removeVertex(VertexId id);
+    /// Of the living vertices of a page. Apart from the pages, so that culling reads little.
+    const Bounds& bounds(std::uint32_t page) const { return bounds_[page]; }
+    /// Recomputes the bounds of a page from its vertices (parallel).
+    void updatePageBounds(std::uint32_t page);
     /// Recomputes the bounds of a block from those of its pages.
-    void updateBounds(std::uint32_t block);
+    void updateBlockBounds(std::uint32_t block);
 
     /// Where the weight code of edge a-b is stored at a; nullptr if there is none.
     std::uint16_t* findHalfEdge(VertexId a, VertexId b);
@@ -204,12 +221,6 @@ class GraphStorage {
     /// to dead vertices. Returns the number of edges dropped.
     std::size_t rebuild();
 
-    static bool overlap(const std::array<float, 3>& aMin, const std::array<float, 3>& aMax,
-                        const Eigen::Vector3f& min, const Eigen::Vector3f& max) {
-        return aMin[0] <= max.x() && aMax[0] >= min.x() && aMin[1] <= max.y() &&
-               aMax[1] >= min.y() && aMin[2] <= max.z() && aMax[2] >= min.z();
-    }
-
  private:
     static constexpr std::uint32_t kPagesPerChunk = 16;
     using PageChunk = std::array<Page, kPagesPerChunk>;
@@ -227,6 +238,7 @@ class GraphStorage {
     double blockSize_;
     std::vector<std::unique_ptr<PageChunk>> chunks_;
     std::uint32_t pageCount_ = 0;
+    std::vector<Bounds> bounds_;            ///< of pages
     std::vector<std::uint32_t> freePages_;  ///< a heap, smallest on top: as after loading
     std::vector<Block> blocks_;
     std::unordered_map<std::array<std::int32_t, 3>, std::uint32_t, KeyHash> blockOfKey_;
@@ -240,7 +252,7 @@ template <class F>
 void GraphStorage::forEachBlockIn(const Eigen::Vector3f& min, const Eigen::Vector3f& max,
                                   F&& f) const {
     const auto visit = [&](std::uint32_t b) {
-        if (blocks_[b].vertices > 0 && overlap(blocks_[b].min, blocks_[b].max, min, max)) {
+        if (blocks_[b].vertices > 0 && blocks_[b].bounds.meets(min, max)) {
             f(b);
         }
     };

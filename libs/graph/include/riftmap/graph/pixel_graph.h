@@ -167,9 +167,8 @@ class PixelGraph {
         const GraphStorage& s = storage();
         s.forEachBlockIn(min, max, [&](std::uint32_t block) {
             for (const std::uint32_t index : s.blocks()[block].pages) {
-                const Page& page = s.page(index);
-                if (GraphStorage::overlap(page.min, page.max, min, max)) {
-                    f(index, page);
+                if (s.bounds(index).meets(min, max)) {
+                    f(index, s.page(index));
                 }
             }
         });
