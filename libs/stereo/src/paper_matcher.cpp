@@ -202,7 +202,7 @@ class NearGuard {
  private:
     /// Discards what lies in or beside a coarse pixel whose surface is too near.
     void discard(DisparityImage& image) const {
-        const float beyond = image.maxDisparity + 1.5F;
+        const float beyond = image.maxDisparity + 2;
         for (int r = 0; r < found_.height; ++r) {
             for (int c = 0; c < found_.width; ++c) {
                 if (found_.valid(c, r) && found_.at(c, r) * kCoarse >= beyond) {

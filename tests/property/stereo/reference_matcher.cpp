@@ -320,7 +320,7 @@ void guard(const Image& left, const Image& right, const StereoOptions& o, Dispar
     removeIsolated(found, 12, 1.0F);
     const auto tooNear = [&](int x, int y) {
         return x >= 0 && y >= 0 && x < found.width && y < found.height && found.valid(x, y) &&
-               found.at(x, y) * 4 >= static_cast<float>(o.minDisparity + o.numDisparities) + 0.5F;
+               found.at(x, y) * 4 >= static_cast<float>(o.minDisparity + o.numDisparities + 1);
     };
     for (int y = 0; y < out.height; ++y) {
         for (int x = 0; x < out.width; ++x) {
