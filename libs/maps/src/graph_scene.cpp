@@ -7,9 +7,11 @@
 #include <mrpt/opengl/CPointCloudColoured.h>
 #include <mrpt/opengl/CSetOfLines.h>
 #include <mrpt/opengl/CSetOfObjects.h>
+#include <mrpt/opengl/CSphere.h>
 
 #include <algorithm>
 #include <array>
+#include <string>
 
 #include "riftmap/core/file.h"
 
@@ -73,13 +75,23 @@ void addRifts(mrpt::opengl::CSetOfObjects& scene, const std::vector<Rift>& rifts
         const Eigen::Vector3d normal = rifts[i].normal.cast<double>();
         const bool isDominant = dominant == i;
         const double l = isDominant ? 2 * length : length;
+        const mrpt::img::TColor colour =
+            isDominant ? mrpt::img::TColor(255, 0, 0) : mrpt::img::TColor(30, 90, 255);
+        const std::string name = "rift " + std::to_string(rifts[i].id);
+        if (normal.norm() < 0.5) {  // none known, and MRPT cannot draw an arrow without length
+            auto ball = mrpt::opengl::CSphere::Create(static_cast<float>(0.09 * l));
+            ball->setLocation(point(centre));
+            ball->setColor_u8(colour);
+            ball->setName(name);
+            group->insert(ball);
+            continue;
+        }
         auto arrow = mrpt::opengl::CArrow::Create();
         arrow->setArrowEnds(point(centre), point((centre + l * normal).eval()));
         arrow->setSmallRadius(static_cast<float>(0.03 * l));
         arrow->setLargeRadius(static_cast<float>(0.09 * l));
-        arrow->setColor_u8(isDominant ? mrpt::img::TColor(255, 0, 0)
-                                      : mrpt::img::TColor(30, 90, 255));
-        arrow->setName("rift " + std::to_string(rifts[i].id));
+        arrow->setColor_u8(colour);
+        arrow->setName(name);
         group->insert(arrow);
     }
     scene.insert(group);

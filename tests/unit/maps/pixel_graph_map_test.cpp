@@ -8,9 +8,11 @@
 #include <mrpt/maps/CMultiMetricMap.h>
 #include <mrpt/obs/CObservation2DRangeScan.h>
 #include <mrpt/obs/CObservationStereoImages.h>
+#include <mrpt/opengl/CArrow.h>
 #include <mrpt/opengl/COpenGLScene.h>
 #include <mrpt/opengl/CPointCloudColoured.h>
 #include <mrpt/opengl/CSetOfObjects.h>
+#include <mrpt/opengl/CSphere.h>
 #include <mrpt/serialization/CArchive.h>
 
 #include <numbers>
@@ -182,6 +184,19 @@ TEST(PixelGraphMap, SavesPointsSceneAndItself) {
     mrpt::opengl::COpenGLScene scene;
     EXPECT_TRUE(scene.loadFromFile((folder / "m.3Dscene").string()));
     EXPECT_EQ(loadMap(folder / "m.pixelgraph").graph().edgeCount(), map.graph().edgeCount());
+}
+
+TEST(GraphScene, ARiftWithoutNormalIsABall) {
+    // MRPT throws on drawing an arrow of no length, and then SceneViewer3D shows nothing at all.
+    std::vector<Rift> rifts(2);
+    rifts[1].normal = {0, 0, 1};
+    mrpt::opengl::CSetOfObjects scene;
+    addRifts(scene, rifts, std::size_t{1}, 0.2);
+    const auto group = scene.getByClass<mrpt::opengl::CSetOfObjects>();
+    ASSERT_TRUE(group);
+    EXPECT_TRUE(group->getByClass<mrpt::opengl::CSphere>(0));
+    EXPECT_TRUE(group->getByClass<mrpt::opengl::CArrow>(0));
+    EXPECT_FALSE(group->getByClass<mrpt::opengl::CArrow>(1));
 }
 
 TEST(MapFile, DamageIsNamed) {

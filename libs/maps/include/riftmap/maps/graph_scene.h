@@ -26,8 +26,8 @@ EdgeColour edgeColour(float weight, float high);
 /// The coloured vertices as one cloud "points", the high edges as lines "high edges" in red.
 void addGraph(mrpt::opengl::CSetOfObjects& scene, const PixelGraph& graph);
 
-/// An arrow along the normal of each rift, `length` [m] long, in a group "rifts": blue, the
-/// dominant one red.
+/// An arrow along the normal of each rift, `length` [m] long (a ball where the normal is not
+/// known), in a group "rifts": blue, the dominant one red and twice as long.
 void addRifts(mrpt::opengl::CSetOfObjects& scene, const std::vector<Rift>& rifts,
               std::optional<std::size_t> dominant, double length);
 
