@@ -1,15 +1,32 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Uses one thing of each library, so that all of them are linked and found when it starts.
-#include <riftmap/core/options.h>
-#include <riftmap/core/pose.h>
+// Maps one view of a wall. A wall wider than the image is torn at the image's border, so it has a
+// rift there; that is what this checks.
 #include <riftmap/core/version.h>
+#include <riftmap/core/view.h>
+#include <riftmap/graph/pixel_graph.h>
 
 #include <cstdio>
 
 int main() {
-    const riftmap::Pose camera = riftmap::lookAt({0, 0, 1}, {2, 0, 1});
-    const Eigen::Vector3d ahead = camera * Eigen::Vector3d(0, 0, 2);
-    std::printf("riftmap %s looks at %.1f %.1f %.1f\n", riftmap::kVersion, ahead.x(), ahead.y(),
-                ahead.z());
-    return (ahead - Eigen::Vector3d(2, 0, 1)).norm() < 1e-12 ? 0 : 1;
+    riftmap::View view;
+    view.camera = {.width = 64,
+                   .height = 48,
+                   .fx = 60,
+                   .fy = 60,
+                   .cx = 31.5,
+                   .cy = 23.5,
+                   .baseline = 0.1,
+                   .doffs = 0};
+    view.world_T_camera = riftmap::lookAt({0, 0, 1}, {2, 0, 1});
+    view.disparity.resize(view.camera.width, view.camera.height);
+    view.disparity.disparity.assign(view.disparity.disparity.size(),
+                                    static_cast<float>(view.camera.disparity(2.0)));
+    view.disparity.sigma.assign(view.disparity.sigma.size(), 0.05F);
+    view.image = cv::Mat::zeros(view.camera.height, view.camera.width, CV_8UC1);
+
+    riftmap::PixelGraph graph;
+    graph.merge(view);
+    std::printf("riftmap %s: %zu vertices, %zu edges, %.2f m2, %zu rifts\n", riftmap::kVersion,
+                graph.vertexCount(), graph.edgeCount(), graph.surfaceArea(), graph.rifts().size());
+    return graph.vertexCount() == 64 * 48 && !graph.rifts().empty() ? 0 : 1;
 }
