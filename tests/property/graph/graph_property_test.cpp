@@ -50,14 +50,15 @@ Scene randomScene(Random& random) {
     return scene;
 }
 
-View randomView(Random& random, const Scene& scene) {
+View randomView(Random& random, const Scene& scene, int width = 64) {
     Eigen::Vector3d eye = random.point(1.0);
     eye.x() += eye.x() < 0 ? -0.8 : 0.8;
-    View view = makeView(scene, smallCamera(64, 48), lookAt(eye, random.point(0.4)),
+    View view = makeView(scene, smallCamera(width, width * 3 / 4), lookAt(eye, random.point(0.4)),
                          {random.below(2) == 0 ? 0.0 : random.in(0.02, 0.3),
                           static_cast<std::uint64_t>(random.below(1 << 30))});
     for (int i = 0; i < 60; ++i) {  // holes
-        view.disparity.disparity[static_cast<std::size_t>(random.below(64 * 48))] = kNoDisparity;
+        view.disparity.disparity[static_cast<std::size_t>(random.below(width * width * 3 / 4))] =
+            kNoDisparity;
     }
     return view;
 }
@@ -192,8 +193,9 @@ TEST(GraphProperty, AssociationFindsTheBestVertexOfTheWholeMap) {
         GraphOptions options = randomOptions(random);
         options.gamma = random.in(0.005, 0.05);
         PixelGraph graph(options);
-        for (int i = 0; i < 3; ++i) {
-            graph.merge(randomView(random, scene));
+        // Coarser, as fine and finer than the view that is matched.
+        for (const int width : {16, 32, random.below(2) == 0 ? 24 : 96}) {
+            graph.merge(randomView(random, scene, width));
         }
         const View view = randomView(random, scene);
         ViewPoints points;
