@@ -298,8 +298,7 @@ YamlMap ExploreRun::figures(const std::string& error) {
             summary.set("f_score_" + d, f.fScore);
             summary.set("spurious_" + d, f.spurious);
         }
-        summary.set("accuracy_headline",
-                    program_.coverage.atDelta(judge_->headline()).accuracy);
+        summary.set("accuracy_headline", program_.coverage.atDelta(judge_->headline()).accuracy);
         summary.set("error_median_m", program_.coverage.errorMedian);
         summary.set("error_p95_m", program_.coverage.errorP95);
         summary.set("explained", program_.coverage.explained);
