@@ -163,7 +163,7 @@ void shrink(const cv::Mat& image, cv::Mat& out) {
         for (int c = 0; c < out.cols; ++c) {
             int sum = kCoarse * kCoarse / 2;
             for (int i = 0; i < kCoarse; ++i) {
-                const auto* from = image.ptr<std::uint8_t>(kCoarse * r + i) + kCoarse * c;
+                const auto* from = image.ptr<std::uint8_t>(kCoarse * r + i, kCoarse * c);
                 for (int j = 0; j < kCoarse; ++j) {
                     sum += from[j];
                 }
