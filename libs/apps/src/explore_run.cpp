@@ -112,6 +112,12 @@ ExploreRun::ExploreRun(ExploreProgram& program, RunDirectory& directory)
     if (program.explore_.rawlog) {
         rawlog_ = std::make_unique<RawlogWriter>(directory.file("run.rawlog"),
                                                  RawlogWriter::Images::kExternal);
+        // riftmap-build config_build.ini run.rawlog makes the same map of it.
+        OptionTable build;
+        program.stereo_.describe(build);
+        program.graph_.describe(build);
+        writeAtomically(directory.file("config_build.ini"),
+                        [&](std::ostream& out) { out << build.dump(); });
     }
     explorer_ = std::make_unique<SurfaceExplorer>(
         *platform_, graph(), *planner_, options, program.stop_,

@@ -35,7 +35,7 @@ class Choice {
         : k_(knowledge),
           pool_(pool),
           scorer_(k_.sensor(), k_.summary(), k_.ledger(), k_.space(), k_.resolution(),
-                  {k_.options().unknownWeight, 2.0}),
+                  ViewScorer::Weights{k_.options().unknownWeight}),
           random_(k_.options().seed * 1000003U + k_.views()),
           good_(k_.sensor().goodDepth(k_.resolution())) {}
 

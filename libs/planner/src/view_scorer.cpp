@@ -81,7 +81,7 @@ ViewScorer::Benefit ViewScorer::benefit(const RiftRecord& record,
     const double vain = std::pow(0.6, record.attempts.size());
     const double cell = summary_->cellSize();
     const double tornArea = static_cast<double>(record.cell.rim) * weights_.reach * cell;
-    const auto coarseArea = static_cast<double>(record.cell.coarse);
+    const double coarseArea = weights_.coarse * static_cast<double>(record.cell.coarse);
     Benefit result;
     result.area = angleQuality * vain * (torn * tornArea + coarse * coarseArea);
     result.quality = angleQuality * (tornArea > 0.3 * coarseArea ? torn : coarse);

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// riftmap-explore as its user runs it, on a small camera.
+#include <gtest/gtest.h>
+
+#include "riftmap/apps/build_program.h"
+#include "riftmap/apps/explore_program.h"
+#include "riftmap/core/csv.h"
+#include "riftmap/core/file.h"
+#include "temporary_folder.h"
+
+namespace riftmap {
+namespace {
+
+using test::TemporaryFolder;
+using Arguments = std::vector<std::string>;
+
+const std::string kConfig = std::string(RIFTMAP_SOURCE_DIR) + "/config/";
+const Arguments kSmallCamera = {"--set",        "Camera.width=160",
+                                "--set",        "Camera.height=120",
+                                "--set",        "Camera.f=130",
+                                "--set",        "Camera.num_disparities=32",
+                                "--set",        "Stereo.num_disparities=32",
+                                "--no-progress"};
+
+Arguments operator+(Arguments a, const Arguments& b) {
+    a.insert(a.end(), b.begin(), b.end());
+    return a;
+}
+
+Arguments roomRun(const std::filesystem::path& out, const std::string& noise, int views) {
+    return Arguments{kConfig + "explore-room.ini",
+                     "--set",
+                     "Graph.target_resolution=0.05",
+                     "--set",
+                     "Noise.level=" + noise,
+                     "--set",
+                     "Stop.max_views=" + std::to_string(views),
+                     "--set",
+                     "Explore.judge=false",
+                     "--out",
+                     out.string()} +
+           kSmallCamera;
+}
+
+int explore(const Arguments& arguments) {
+    ExploreProgram program;
+    return runProgram(program, arguments);
+}
+
+TEST(Explore, fillsItsRunDirectory) {
+    const TemporaryFolder folder;
+    const auto run = folder / "run";
+    ASSERT_EQ(explore(roomRun(run, "N0", 4)), 0);
+    for (const auto* name : {"graph.ply", "map.pixelgraph", "scene.3Dscene", "trajectory.tum",
+                             "steps.csv", "rifts.csv", "summary.yaml", "config_used.ini",
+                             "manifest.yaml", "run.rawlog", "report.html", "map.png"}) {
+        EXPECT_TRUE(std::filesystem::exists(run / name)) << name;
+    }
+    EXPECT_EQ(readCsv(run / "steps.csv").rows.size(), 4U);
+    const CsvTable rifts = readCsv(run / "rifts.csv");
+    const std::size_t state = rifts.column("state");
+    std::size_t deferred = 0;
+    for (const auto& row : rifts.rows) {
+        EXPECT_NE(row[state], "open");  // the run is over
+        deferred += row[state] == "deferred" ? 1 : 0;
+    }
+    EXPECT_GT(deferred, 10U);
+    const std::string page = readFile(run / "report.html");
+    EXPECT_EQ(page.find("http://"), std::string::npos);
+    EXPECT_EQ(page.find("https://"), std::string::npos);
+}
+
+class ExploreNoise : public testing::TestWithParam<std::string> {};
+
+TEST_P(ExploreNoise, whatItRecordedBuildsTheSameMap) {
+    const TemporaryFolder folder;
+    ASSERT_EQ(explore(roomRun(folder / "run", GetParam(), 4)), 0);
+    BuildProgram build;
+    ASSERT_EQ(runProgram(build, {(folder / "run" / "config_build.ini").string(),
+                                 (folder / "run" / "run.rawlog").string(), "--out",
+                                 (folder / "built").string(), "--no-progress"}),
+              0);
+    EXPECT_EQ(readFile(folder / "run" / "graph.ply"), readFile(folder / "built" / "graph.ply"));
+}
+
+INSTANTIATE_TEST_SUITE_P(Levels, ExploreNoise, testing::Values("N0", "N3", "N4"));
+
+TEST(Explore, theNumberOfThreadsChangesNoByte) {
+    const TemporaryFolder folder;
+    for (const std::string threads : {"1", "2"}) {
+        ASSERT_EQ(explore(roomRun(folder / threads, "N3", 6) + Arguments{"--threads", threads}), 0);
+    }
+    for (const auto* name : {"graph.ply", "trajectory.tum", "rifts.csv"}) {
+        EXPECT_EQ(readFile(folder / "1" / name), readFile(folder / "2" / name)) << name;
+    }
+}
+
+TEST(Explore, aResumedRunEndsAsIfItHadNotBeenInterrupted) {
+    const TemporaryFolder folder;
+    ASSERT_EQ(explore(roomRun(folder / "whole", "N0", 5)), 0);
+    // Interrupted after two views; the configuration there asks for five.
+    ASSERT_EQ(explore(roomRun(folder / "cut", "N0", 5) + Arguments{"--set", "Stop.max_seconds=0"}),
+              0);
+    EXPECT_LT(readCsv(folder / "cut" / "steps.csv").rows.size(), 5U);
+    ASSERT_EQ(explore(Arguments{(folder / "cut" / "config_used.ini").string(), "--resume",
+                                (folder / "cut").string(), "--set", "Stop.max_seconds=1e6",
+                                "--no-progress"}),
+              0);
+    for (const auto* name : {"graph.ply", "trajectory.tum", "rifts.csv"}) {
+        EXPECT_EQ(readFile(folder / "whole" / name), readFile(folder / "cut" / name)) << name;
+    }
+}
+
+/// An object on its own, known to stand in a box: ends by itself and covers what can be seen.
+TEST(Explore, endsByItselfWithAnObjectCovered) {
+    const TemporaryFolder folder;
+    ExploreProgram program;
+    const int code =
+        runProgram(program, Arguments{kConfig + "explore-sculpture.ini", "--set", "Noise.level=N0",
+                                      "--set", "Graph.target_resolution=0.04", "--set",
+                                      "Graph.gamma=0.01", "--set", "Eval.deltas=0.04", "--set",
+                                      "Eval.headline=0.04", "--set", "Eval.samples=2000", "--set",
+                                      "Explore.rawlog=false", "--out", (folder / "run").string()} +
+                                kSmallCamera);
+    ASSERT_EQ(code, 0);
+    EXPECT_EQ(program.stopReason, "complete");
+    EXPECT_EQ(program.collisions, 0);
+    EXPECT_LE(program.views, 60U);
+    EXPECT_GE(program.coverage.at.front().cObs, 0.95);
+    EXPECT_GE(program.coverage.at.front().accuracy, 0.99);
+}
+
+}  // namespace
+}  // namespace riftmap
