@@ -33,7 +33,7 @@ class Frustum {
         }
         offsets_ = {0, 0, 0, 0, -kNearest, farthest};
     }
-    bool meets(const Bounds& box) const {
+    bool meets(const PageBounds& box) const {
         const auto& min = box.min;
         const auto& max = box.max;
         const Eigen::Vector3f low = Eigen::Vector3f(min[0], min[1], min[2]) - translation_;

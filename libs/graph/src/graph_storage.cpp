@@ -10,7 +10,7 @@ namespace riftmap {
 
 namespace {
 
-constexpr Bounds emptyBounds() {
+constexpr PageBounds emptyBounds() {
     constexpr float kInf = std::numeric_limits<float>::infinity();
     return {{kInf, kInf, kInf}, {-kInf, -kInf, -kInf}};
 }
@@ -146,7 +146,7 @@ void GraphStorage::removeVertex(VertexId id) {
 
 void GraphStorage::updatePageBounds(std::uint32_t index) {
     const Page& p = page(index);
-    Bounds b = emptyBounds();
+    PageBounds b = emptyBounds();
     forEachBit(p.alive, [&](std::uint32_t s) {
         b.min = {std::min(b.min[0], p.x[s]), std::min(b.min[1], p.y[s]),
                  std::min(b.min[2], p.z[s])};

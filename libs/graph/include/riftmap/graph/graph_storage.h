@@ -34,7 +34,7 @@ enum VertexState : std::uint8_t {
 };
 
 /// Box of the map frame, borders included [m].
-struct Bounds {
+struct PageBounds {
     std::array<float, 3> min{}, max{};
     bool meets(const Eigen::Vector3f& low, const Eigen::Vector3f& high) const {
         return min[0] <= high.x() && max[0] >= low.x() && min[1] <= high.y() && max[1] >= low.y() &&
@@ -79,7 +79,7 @@ struct Page {
 /// A cube of space and the pages that hold its vertices.
 struct Block {
     std::array<std::int32_t, 3> key{};  ///< floor(position / blockSize) at creation of a vertex
-    Bounds bounds;                      ///< of its vertices; fusion may leave the cube
+    PageBounds bounds;                      ///< of its vertices; fusion may leave the cube
     std::vector<std::uint32_t> pages;   ///< ascending in age
     std::uint32_t vertices = 0;
 };
@@ -145,7 +145,7 @@ class GraphStorage {
     /// Deletes a vertex with its edges.
     void removeVertex(VertexId id);
     /// Of the living vertices of a page. Apart from the pages, so that culling reads little.
-    const Bounds& bounds(std::uint32_t page) const { return bounds_[page]; }
+    const PageBounds& bounds(std::uint32_t page) const { return bounds_[page]; }
     /// Recomputes the bounds of a page from its vertices (parallel).
     void updatePageBounds(std::uint32_t page);
     /// Recomputes the bounds of a block from those of its pages.
@@ -238,7 +238,7 @@ class GraphStorage {
     double blockSize_;
     std::vector<std::unique_ptr<PageChunk>> chunks_;
     std::uint32_t pageCount_ = 0;
-    std::vector<Bounds> bounds_;            ///< of pages
+    std::vector<PageBounds> bounds_;            ///< of pages
     std::vector<std::uint32_t> freePages_;  ///< a heap, smallest on top: as after loading
     std::vector<Block> blocks_;
     std::unordered_map<std::array<std::int32_t, 3>, std::uint32_t, KeyHash> blockOfKey_;
