@@ -18,7 +18,7 @@ namespace riftmap {
 
 namespace {
 
-constexpr std::uint32_t kMethodVersion = 2;
+constexpr std::uint32_t kMethodVersion = 3;
 
 /// Most samples are seen along one of a few lines of sight. Deep inside what is hidden a moderate
 /// fan will do, for each sample's fan is turned differently; the finest one is for the rim of what
@@ -28,10 +28,11 @@ struct Round {
     bool onlyBesideSeen;
 };
 
-std::array<Round, 3> roundsOf(int directions) {
-    return {{{std::min(64, directions), false},
-             {std::max(directions / 8, 16), false},
-             {directions, true}}};
+/// `spacing` [m] of the samples: the sparser they are the less they help each other.
+std::array<Round, 3> roundsOf(int directions, double spacing) {
+    const double sparser = std::max(1.0, spacing * spacing / 1e-4);  // than one a cm^2
+    const int moderate = static_cast<int>(std::min<double>(directions, sparser * directions / 8));
+    return {{{std::min(64, directions), false}, {moderate, false}, {directions, true}}};
 }
 
 constexpr std::size_t kMostNeighbours = 24;
@@ -42,6 +43,10 @@ struct Sight {
     Eigen::Vector3f eye = Eigen::Vector3f::Zero();
     std::int8_t side = 0;  ///< +1 the triangle's normal, -1 against it, 0 not seen
 };
+
+double spacingOf(const SurfaceSamples& samples) {
+    return std::sqrt(samples.area / static_cast<double>(samples.points.size()));
+}
 
 /// Ray origins lie this far off the surface [m]: far more than a float's rounding, far less than
 /// any distance that matters.
@@ -164,18 +169,21 @@ class SightFinder {
         const Eigen::Vector3d origin =
             point + side * offset_ * samples_.normals[sample].cast<double>();
         const double end = std::min(inBox->second, freeLength(origin, direction, inBox->second));
-        std::optional<double> doubtful;
+        // Where the grid alone does not say yes, the roomiest place is looked at exactly.
+        double doubtful = 0;
+        float roomiest = 0;
         for (double t = inBox->first; t <= end; t += 0.5 * reachable_.grid()) {
-            const float margin = reachable_.margin(point + t * direction);
-            if (margin >= 0) {
+            const ReachableSpace::Room room = reachable_.room(point + t * direction);
+            if (room.certain) {
                 return point + t * direction;
             }
-            if (!doubtful && margin > -static_cast<float>(reachable_.grid())) {
+            if (room.estimate > roomiest) {
+                roomiest = room.estimate;
                 doubtful = t;
             }
         }
-        if (doubtful && reachable_.contains(point + *doubtful * direction)) {
-            return point + *doubtful * direction;
+        if (roomiest > 0 && reachable_.contains(point + doubtful * direction)) {
+            return point + doubtful * direction;
         }
         return std::nullopt;
     }
@@ -194,8 +202,7 @@ class Spreading {
     Spreading(const SightFinder& finder, const SurfaceSamples& samples)
         : finder_(finder),
           samples_(samples),
-          radius_(static_cast<float>(
-              3 * std::sqrt(samples.area / static_cast<double>(samples.points.size())))),
+          radius_(static_cast<float>(3 * spacingOf(samples))),
           index_(samples.points, radius_) {}
 
     /// True if a sample nearby was seen.
@@ -306,7 +313,7 @@ ObservableSet observableSet(const RayCaster& caster, const ViewSpace& space,
         const SightFinder finder(caster, space, reachable, samples, options.maxIncidence);
         std::vector<Sight> sights(count);
         const Spreading spreading(finder, samples);
-        for (const Round& round : roundsOf(options.directions)) {
+        for (const Round& round : roundsOf(options.directions, spacingOf(samples))) {
             const std::vector<Sight> before = sights;
             tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
                 if (before[i].side == 0 &&

@@ -64,13 +64,20 @@ ReachableSpace::ReachableSpace(const RayCaster& caster, const ViewSpace& space, 
         distance_[i] = static_cast<float>(wall ? wall->distance : cap);
     });
     reachable_.assign(count, 0);
-    const std::vector<std::size_t> first = nodesAround(space_.start);
+    std::vector<std::size_t> first;
+    anyNodeAround(space_.start, [&](std::size_t node) {
+        if (caster_->sweptClear(space_.start, position(node), space_.clearance)) {
+            first.push_back(node);
+        }
+        return false;
+    });
     if (first.empty()) {
         throw std::runtime_error("from the start " + text(space_.start) +
                                  " no camera position of the grid of " + std::to_string(grid_) +
                                  " m can be reached; a smaller Eval.grid may help");
     }
     flood(first);
+    markNeighbours();
 }
 
 Eigen::Vector3d ReachableSpace::position(std::size_t node) const {
@@ -102,17 +109,23 @@ bool ReachableSpace::stepClear(std::size_t a, std::size_t b) const {
     return caster_->sweptClear(position(a), position(b), space_.clearance);
 }
 
-std::vector<std::size_t> ReachableSpace::nodesAround(const Eigen::Vector3d& place) const {
-    std::vector<std::size_t> out;
+template <class F>
+bool ReachableSpace::anyNodeAround(const Eigen::Vector3d& place, F&& f) const {
     for (int i = 0; i < 27; ++i) {
         const Eigen::Vector3d offset(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
         const std::ptrdiff_t node = nearestNode(place + grid_ * offset);
-        if (node >= 0 && caster_->sweptClear(place, position(static_cast<std::size_t>(node)),
-                                             space_.clearance)) {
-            out.push_back(static_cast<std::size_t>(node));
+        if (node >= 0 && f(static_cast<std::size_t>(node))) {
+            return true;
         }
     }
-    return out;
+    return false;
+}
+
+void ReachableSpace::markNeighbours() {
+    beside_ = reachable_;
+    tbb::parallel_for(std::size_t{0}, beside_.size(), [&](std::size_t i) {
+        beside_[i] = anyNodeAround(position(i), [&](std::size_t n) { return reachable_[n] != 0; });
+    });
 }
 
 void ReachableSpace::flood(std::vector<std::size_t> queue) {
@@ -144,21 +157,27 @@ std::size_t ReachableSpace::reachableCount() const {
     return static_cast<std::size_t>(std::count(reachable_.begin(), reachable_.end(), 1));
 }
 
-float ReachableSpace::margin(const Eigen::Vector3d& place) const {
-    const std::ptrdiff_t node = nearestNode(place);
-    if (node < 0 || reachable_[static_cast<std::size_t>(node)] == 0) {
-        return -std::numeric_limits<float>::infinity();
+ReachableSpace::Room ReachableSpace::room(const Eigen::Vector3d& place) const {
+    const std::ptrdiff_t nearest = nearestNode(place);
+    if (nearest < 0 || beside_[static_cast<std::size_t>(nearest)] == 0) {
+        return {};
     }
-    const auto i = static_cast<std::size_t>(node);
-    return distance_[i] - static_cast<float>((place - position(i)).norm() + space_.clearance);
+    const auto node = static_cast<std::size_t>(nearest);
+    // The distance changes by at most a metre a metre, so this bounds the whole way to the node.
+    const double least = static_cast<double>(distance_[node]) - (place - position(node)).norm();
+    return {reachable_[node] != 0 && least >= space_.clearance, distance_[node]};
 }
 
 bool ReachableSpace::contains(const Eigen::Vector3d& place) const {
-    const std::ptrdiff_t node = nearestNode(place);
-    if (node < 0 || reachable_[static_cast<std::size_t>(node)] == 0) {
+    if ((place.array() < space_.boxMin.array()).any() ||
+        (place.array() > space_.boxMax.array()).any() ||
+        caster_->closest(place, space_.clearance)) {
         return false;
     }
-    return caster_->sweptClear(place, position(static_cast<std::size_t>(node)), space_.clearance);
+    return anyNodeAround(place, [&](std::size_t node) {
+        return reachable_[node] != 0 &&
+               caster_->sweptClear(place, position(node), space_.clearance);
+    });
 }
 
 }  // namespace riftmap

@@ -40,10 +40,14 @@ class ReachableSpace {
     double grid() const { return grid_; }
     std::size_t nodeCount() const { return reachable_.size(); }
     std::size_t reachableCount() const;
-    /// A lower bound of the clearance of this place minus that asked for, if it is connected to
-    /// the start through its nearest node by that bound; negative where the grid does not say.
-    float margin(const Eigen::Vector3d& place) const;
-    /// True if the nearest node is reachable and the place has the clearance, exactly.
+    struct Room {
+        bool certain = false;  ///< the place is reachable, by what is known at the nearest node
+        float estimate = 0;    ///< clearance to be expected [m]; 0: nothing reachable is near
+    };
+    /// What the grid alone says about a place: quick.
+    Room room(const Eigen::Vector3d& place) const;
+    /// True if a straight way with the clearance leads from the place to one of the reachable
+    /// nodes around it: exact, slow.
     bool contains(const Eigen::Vector3d& place) const;
     /// Calls f(position) for each reachable node, in order.
     template <class F>
@@ -59,7 +63,9 @@ class ReachableSpace {
     Eigen::Vector3d position(std::size_t node) const;
     std::ptrdiff_t nearestNode(const Eigen::Vector3d& place) const;
     bool stepClear(std::size_t a, std::size_t b) const;
-    std::vector<std::size_t> nodesAround(const Eigen::Vector3d& place) const;
+    template <class F>
+    bool anyNodeAround(const Eigen::Vector3d& place, F&& f) const;
+    void markNeighbours();
     void flood(std::vector<std::size_t> queue);
 
     const RayCaster* caster_;
@@ -69,6 +75,7 @@ class ReachableSpace {
     Eigen::Vector3i size_;
     std::vector<float> distance_;  ///< to the nearest surface, capped [m]
     std::vector<std::uint8_t> reachable_;
+    std::vector<std::uint8_t> beside_;  ///< reachable, or one of the 26 nodes around is
 };
 
 /// Which samples some pose of the view space can see.
