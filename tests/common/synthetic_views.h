@@ -2,8 +2,6 @@
 // Views of simple worlds whose surface is known exactly: rays against planes, boxes and spheres.
 #pragma once
 
-#include <tbb/parallel_for.h>
-
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -15,6 +13,7 @@
 #include <vector>
 
 #include "riftmap/core/camera.h"
+#include "riftmap/core/parallel.h"
 #include "riftmap/core/pose.h"
 #include "riftmap/core/view.h"
 
@@ -165,7 +164,8 @@ inline View makeView(const Scene& scene, const StereoCamera& camera, const Pose&
     view.world_T_camera = pose;
     view.disparity.resize(camera.width, camera.height);
     view.image = cv::Mat(camera.height, camera.width, CV_8UC3);
-    tbb::parallel_for(0, camera.height, [&](int r) {
+    parallelFor(static_cast<std::size_t>(camera.height), 1, [&](std::size_t first, std::size_t) {
+        const int r = static_cast<int>(first);
         std::mt19937_64 random(noise.seed * 0x9E3779B97F4A7C15ULL + static_cast<std::uint64_t>(r));
         std::normal_distribution<double> gauss(0.0, 1.0);
         for (int c = 0; c < camera.width; ++c) {

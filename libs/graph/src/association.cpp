@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "association.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <atomic>
 #include <bit>
 #include <cmath>
+
+#include "riftmap/core/parallel.h"
 
 namespace riftmap {
 namespace {
@@ -72,7 +71,8 @@ void Association::computeReach(const ViewPoints& view, const GraphOptions& optio
         return static_cast<std::size_t>(r) * static_cast<std::size_t>(tileColumns_) +
                static_cast<std::size_t>(c);
     };
-    tbb::parallel_for(0, tileRows_, [&](int tr) {
+    parallelFor(static_cast<std::size_t>(tileRows_), 1, [&](std::size_t first, std::size_t) {
+        const int tr = static_cast<int>(first);
         for (int r = tr * kTile; r < std::min(view.height, (tr + 1) * kTile); ++r) {
             for (int c = 0; c < view.width; ++c) {
                 const std::size_t i = view.index(c, r);
@@ -172,12 +172,11 @@ void Association::project(const GraphStorage& storage, const ViewPoints& view,
     areaOf.resize(n);
     pixelOf_.resize(n);
     start_.assign(view.z.size() + 1, 0);
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, pages.size(), 16),
-                      [&](const tbb::blocked_range<std::size_t>& range) {
-                          for (std::size_t i = range.begin(); i != range.end(); ++i) {
-                              projectPage(storage, view, static_cast<std::uint32_t>(i));
-                          }
-                      });
+    parallelFor(pages.size(), 16, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i != end; ++i) {
+            projectPage(storage, view, static_cast<std::uint32_t>(i));
+        }
+    });
     sortByPixel();
 }
 
@@ -194,24 +193,22 @@ void Association::sortByPixel() {
     }
     entryCandidate_.resize(sum + kPadding);
     // The order within a pixel depends on the threads; matching does not depend on that order.
-    tbb::parallel_for(
-        tbb::blocked_range<std::size_t>(0, pixelOf_.size(), 4096),
-        [&](const tbb::blocked_range<std::size_t>& range) {
-            for (std::size_t k = range.begin(); k != range.end(); ++k) {
-                if (pixelOf_[k] == kNone) {
-                    continue;
-                }
-                const std::uint32_t at =
-                    atomic(start_[pixelOf_[k]]).fetch_sub(1, std::memory_order_relaxed) - 1;
-                const Candidate& o = candidates[k];
-                const float noise = kNoiseGate * o.sigma;
-                entryU_[at] = o.u;
-                entryV_[at] = o.v;
-                entryZ_[at] = o.z;
-                entryNoise_[at] = noise * noise;
-                entryCandidate_[at] = static_cast<std::int32_t>(k);
+    parallelFor(pixelOf_.size(), 4096, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t k = begin; k != end; ++k) {
+            if (pixelOf_[k] == kNone) {
+                continue;
             }
-        });
+            const std::uint32_t at =
+                atomic(start_[pixelOf_[k]]).fetch_sub(1, std::memory_order_relaxed) - 1;
+            const Candidate& o = candidates[k];
+            const float noise = kNoiseGate * o.sigma;
+            entryU_[at] = o.u;
+            entryV_[at] = o.v;
+            entryZ_[at] = o.z;
+            entryNoise_[at] = noise * noise;
+            entryCandidate_[at] = static_cast<std::int32_t>(k);
+        }
+    });
 }
 
 /// The paper's rule: the nearest vertex in space, nearer than gamma.
@@ -272,11 +269,11 @@ void Association::match(const ViewPoints& view, const GraphOptions& options) {
     std::atomic<std::size_t> count{0};
     const auto gamma = static_cast<float>(options.gamma);
     const auto target = static_cast<float>(options.targetResolution);
-    const auto matchRows = [&](const tbb::blocked_range<int>& range) {
+    const auto matchRows = [&](std::size_t begin, std::size_t end) {
         std::vector<float> distance(static_cast<std::size_t>(view.width));
         std::vector<std::int32_t> found(static_cast<std::size_t>(view.width));
         std::size_t mine = 0;
-        for (int r = range.begin(); r != range.end(); ++r) {
+        for (int r = static_cast<int>(begin); r < static_cast<int>(end); ++r) {
             const std::size_t line = view.index(0, r);
             if (options.fusion == GraphOptions::Fusion::kFirst) {
                 matchByDistance(view, gamma, r, distance.data(), found.data());
@@ -297,7 +294,7 @@ void Association::match(const ViewPoints& view, const GraphOptions& options) {
         }
         count.fetch_add(mine, std::memory_order_relaxed);
     };
-    tbb::parallel_for(tbb::blocked_range<int>(0, view.height, 8), matchRows);
+    parallelFor(static_cast<std::size_t>(view.height), 8, matchRows);
     matched = count.load();
 }
 

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
 
 #include <stdexcept>
 
+#include "riftmap/core/parallel.h"
 #include "riftmap/graph/pixel_graph.h"
 
 namespace riftmap {
@@ -18,7 +17,8 @@ struct OneWay {
 OneWay compareTo(const PixelGraph& a, const PixelGraph& b, float distance) {
     const GraphStorage& storage = a.storage();
     std::vector<OneWay> perPage(storage.pageCount());
-    tbb::parallel_for(std::uint32_t{0}, storage.pageCount(), [&](std::uint32_t index) {
+    parallelFor(storage.pageCount(), 1, [&](std::size_t first, std::size_t) {
+        const auto index = static_cast<std::uint32_t>(first);
         OneWay& sum = perPage[index];
         const Page& page = storage.page(index);
         forEachBit(page.alive, [&](std::uint32_t slot) {

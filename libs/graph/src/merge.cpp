@@ -1,15 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "merge.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cmath>
 
 #include "normals.h"
+#include "riftmap/core/parallel.h"
 #include "visibility.h"
 
 namespace riftmap {
@@ -40,14 +38,14 @@ class StopWatch {
     std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };
 
+/// f(i) for each i of [0, n), `atOnce` in one go.
 template <class F>
-void parallelFor(std::size_t n, std::size_t atOnce, F&& f) {
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, atOnce),
-                      [&](const tbb::blocked_range<std::size_t>& range) {
-                          for (std::size_t i = range.begin(); i != range.end(); ++i) {
-                              f(i);
-                          }
-                      });
+void forEach(std::size_t n, std::size_t atOnce, F&& f) {
+    parallelFor(n, atOnce, [&f](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i != end; ++i) {
+            f(i);
+        }
+    });
 }
 
 std::array<std::uint8_t, 3> colourAt(const cv::Mat& image, std::uint32_t pixel, int width) {
@@ -100,11 +98,10 @@ MergeResult Merger::merge(const View& view, GraphStorage& storage, RiftFinder& r
 
     work_.assign(seen_.pages.size(), PageWork{});
     touchedBlocks_.clear();
-    parallelFor(work_.size(), kPagesAtOnce, [&](std::size_t i) {
-        findSeenThroughEdges(storage, static_cast<std::uint32_t>(i));
-    });
-    parallelFor(work_.size(), kPagesAtOnce,
-                [&](std::size_t i) { fusePage(view, storage, static_cast<std::uint32_t>(i)); });
+    forEach(work_.size(), kPagesAtOnce,
+            [&](std::size_t i) { findSeenThroughEdges(storage, static_cast<std::uint32_t>(i)); });
+    forEach(work_.size(), kPagesAtOnce,
+            [&](std::size_t i) { fusePage(view, storage, static_cast<std::uint32_t>(i)); });
     deleteSeenThrough(storage, rifts, result);
     times_.fuse = watch.lap();
 
@@ -367,7 +364,7 @@ void Merger::grow(const View& view, GraphStorage& storage, MergeResult& result) 
     vertexOf_.resize(n);
     isFresh_.assign(n, 0);
     fresh_.clear();
-    parallelFor(n, 4096, [&](std::size_t i) {
+    forEach(n, 4096, [&](std::size_t i) {
         vertexOf_[i] =
             seen_.matchOf[i] == Association::kNone ? kNoVertex : seen_.idOf(seen_.matchOf[i]);
     });
@@ -395,7 +392,7 @@ void Merger::grow(const View& view, GraphStorage& storage, MergeResult& result) 
             }
         }
     }
-    parallelFor(fresh_.size(), 512, [&](std::size_t f) {
+    forEach(fresh_.size(), 512, [&](std::size_t f) {
         const std::uint32_t pixel = fresh_[f];
         const auto w = static_cast<std::uint32_t>(points_.width);
         const int column = static_cast<int>(pixel % w), row = static_cast<int>(pixel / w);
@@ -422,7 +419,7 @@ void Merger::connectNew(GraphStorage& storage, MergeResult& result) {
     // Each new vertex is one pixel and writes its own half-edges to other new ones.
     std::atomic<std::size_t> added{0};
     const auto w = static_cast<std::size_t>(points_.width);
-    parallelFor(fresh_.size(), 1024, [&](std::size_t f) {
+    forEach(fresh_.size(), 1024, [&](std::size_t f) {
         const std::size_t i = fresh_[f];
         const VertexId id = vertexOf_[i];
         const auto connect = [&](std::size_t j, std::uint16_t code) {
@@ -463,7 +460,7 @@ void Merger::connectMatched(GraphStorage& storage, MergeResult& result) {
     const std::size_t strips =
         (static_cast<std::size_t>(points_.height) + kRowsAtOnce - 1) / kRowsAtOnce;
     wantedEdges_.resize(strips);
-    parallelFor(strips, 1, [&](std::size_t strip) {
+    forEach(strips, 1, [&](std::size_t strip) {
         auto& list = wantedEdges_[strip];
         list.clear();
         const auto connect = [&](std::size_t i, std::size_t j, std::uint16_t code) {
@@ -509,7 +506,7 @@ void Merger::refreshNormals(GraphStorage& storage) {
         storage.page(GraphStorage::pageOf(id)).normal[GraphStorage::slotOf(id)] =
             compact::encodeDirection(planeNormal(storage, id, points_.translation, paper()));
     };
-    parallelFor(fresh_.size(), 512, [&](std::size_t f) {
+    forEach(fresh_.size(), 512, [&](std::size_t f) {
         const std::uint32_t pixel = fresh_[f];
         const auto w = static_cast<std::uint32_t>(points_.width);
         const int column = static_cast<int>(pixel % w), row = static_cast<int>(pixel / w);
@@ -522,7 +519,7 @@ void Merger::refreshNormals(GraphStorage& storage) {
             fit(id);
         }
     });
-    parallelFor(work_.size(), kPagesAtOnce, [&](std::size_t i) {
+    forEach(work_.size(), kPagesAtOnce, [&](std::size_t i) {
         const std::uint32_t index = seen_.pages[i];
         forEachBit(work_[i].moved & storage.page(index).alive,
                    [&](std::uint32_t slot) { fit(GraphStorage::idOf(index, slot)); });
@@ -537,7 +534,7 @@ void Merger::refreshNormals(GraphStorage& storage) {
         }
         std::sort(ends.begin(), ends.end());
         ends.erase(std::unique(ends.begin(), ends.end()), ends.end());
-        parallelFor(ends.size(), 512, [&](std::size_t i) { fit(ends[i]); });
+        forEach(ends.size(), 512, [&](std::size_t i) { fit(ends[i]); });
     }
 }
 
@@ -563,8 +560,8 @@ void Merger::finish(GraphStorage& storage, RiftFinder& rifts, std::int64_t& area
     }
     std::sort(freshPages_.begin(), freshPages_.end());
     freshPages_.erase(std::unique(freshPages_.begin(), freshPages_.end()), freshPages_.end());
-    parallelFor(freshPages_.size(), kPagesAtOnce,
-                [&](std::size_t i) { storage.updatePageBounds(freshPages_[i]); });
+    forEach(freshPages_.size(), kPagesAtOnce,
+            [&](std::size_t i) { storage.updatePageBounds(freshPages_[i]); });
     std::sort(touchedBlocks_.begin(), touchedBlocks_.end());
     touchedBlocks_.erase(std::unique(touchedBlocks_.begin(), touchedBlocks_.end()),
                          touchedBlocks_.end());

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "rift_finder.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+
+#include "riftmap/core/parallel.h"
 
 namespace riftmap {
 namespace {
@@ -271,8 +271,8 @@ const std::vector<Rift>& RiftFinder::update(const GraphStorage& storage) {
     touched_.clear();
     std::sort(work.begin(), work.end());
     std::vector<std::vector<Rift>> found(work.size());
-    tbb::parallel_for(std::size_t{0}, work.size(),
-                      [&](std::size_t i) { found[i] = find(storage, work[i]); });
+    parallelFor(work.size(), 1,
+                [&](std::size_t i, std::size_t) { found[i] = find(storage, work[i]); });
     std::vector<std::uint32_t> gone;
     for (std::size_t i = 0; i < work.size(); ++i) {
         Cell& cell = cells_[work[i]];

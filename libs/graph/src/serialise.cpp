@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The saved form of a graph; doc/file-formats.md describes it.
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <array>
@@ -14,6 +13,7 @@
 
 #include "crc32.h"
 #include "pixel_graph_impl.h"
+#include "riftmap/core/parallel.h"
 
 namespace riftmap {
 namespace {
@@ -205,7 +205,7 @@ void PixelGraph::save(std::ostream& out) const {
     put(directory, static_cast<std::uint64_t>(impl_->rawPoints));
     put(directory, static_cast<std::uint32_t>(blocks.size()));
     std::vector<std::uint64_t> sizes(blocks.size());
-    tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t b) {
+    parallelFor(blocks.size(), 1, [&](std::size_t b, std::size_t) {
         sizes[b] = 20 + blocks[b].pages.size() * (kPageBytes + 12);
         for (const std::uint32_t index : blocks[b].pages) {
             const Page& page = storage.page(index);
@@ -245,7 +245,7 @@ void PixelGraph::save(std::ostream& out) const {
     for (std::size_t first = 0; first < blocks.size(); first += kBlocksAtOnce) {
         const std::size_t n = std::min(kBlocksAtOnce, blocks.size() - first);
         std::vector<Bytes> batch(n);
-        tbb::parallel_for(std::size_t{0}, n, [&](std::size_t i) {
+        parallelFor(n, 1, [&](std::size_t i, std::size_t) {
             batch[i] = blockBytes(storage, blocks[first + i]);
             put(batch[i], Crc32::of(batch[i].data(), batch[i].size()));
         });

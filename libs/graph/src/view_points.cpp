@@ -1,29 +1,28 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_points.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <utility>
+
+#include "riftmap/core/parallel.h"
 
 namespace riftmap {
 namespace {
 
 constexpr float kLargestStretch = 10.0F;  // beyond 84 degrees nothing is explained by the angle
 constexpr float kNoiseFactor = 3.0F;      // what noise explains, in standard deviations
-constexpr int kRowsAtOnce = 16;
+constexpr std::size_t kRowsAtOnce = 16;
 
 template <class F>
 void forEachRow(int rows, F&& f) {
-    tbb::parallel_for(tbb::blocked_range<int>(0, rows, kRowsAtOnce),
-                      [&](const tbb::blocked_range<int>& range) {
-                          for (int r = range.begin(); r != range.end(); ++r) {
-                              f(r);
-                          }
-                      });
+    parallelFor(static_cast<std::size_t>(rows), kRowsAtOnce,
+                [&f](std::size_t begin, std::size_t end) {
+                    for (std::size_t r = begin; r != end; ++r) {
+                        f(static_cast<int>(r));
+                    }
+                });
 }
 
 /// Least-squares plane d = a x + b y + e over pixels.

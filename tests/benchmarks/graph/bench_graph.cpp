@@ -3,6 +3,7 @@
 //   bench-graph [--csv FILE] [--vertices N] [--quick]
 #include <malloc.h>
 #include <octomap/octomap.h>
+#include <tbb/parallel_for.h>
 #include <unistd.h>
 
 #include <chrono>
