@@ -7,6 +7,7 @@
 #include <sstream>
 #include <utility>
 
+#include "cutaway_picture.h"
 #include "riftmap/apps/explore_report.h"
 #include "riftmap/apps/pictures.h"
 #include "riftmap/core/file.h"
@@ -209,6 +210,12 @@ void ExploreRun::onStep(const ExploreStep& step, const Knowledge& knowledge) {
     }
     recorder_.step(graph(), row);
     history_.push_back(std::move(figures));
+    if (program_.explore_.pictureEvery > 0 &&
+        history_.size() % static_cast<std::size_t>(program_.explore_.pictureEvery) == 0) {
+        collectVertices(true);
+        writePicture(directory_.file("map_" + std::to_string(history_.size()) + ".png"),
+                     cutawayPicture(points_, normals_, colours_, taken_));
+    }
     if (program_.progress()) {
         showProgress(step, knowledge);
     }
@@ -255,9 +262,7 @@ void ExploreRun::finish(const std::string& error) {
     scene.taken = taken_;
     const YamlMap more = figures(error);
     recorder_.finish(map_, certificate(), scene, program_.stopReason, more);
-    MapPictureParts parts;
-    parts.taken = taken_;
-    writePicture(directory_.file("map.png"), mapPicture(graph(), parts));
+    writePicture(directory_.file("map.png"), cutawayPicture(points_, normals_, colours_, taken_));
     writeReport();
 }
 

@@ -106,7 +106,7 @@ void Choice::addAround(const RiftRecord& record, int directions) {
                        std::sin(tilt) * (std::cos(angle) * t + std::sin(angle) * side));
     }
     const double least = 1.2 * k_.sensor().nearLimit + 0.02;
-    const double most = std::max(least, good_);
+    const double most = std::max(least, (rim ? 1.4 : 1.0) * good_);
     for (const Eigen::Vector3d& way : ways) {
         const Eigen::Vector3d d = way.normalized();
         for (const double s : {0.12, 0.5, 0.95}) {

@@ -11,6 +11,9 @@ namespace {
 
 constexpr int kPixels = 12;  ///< of the image to one of the depth buffer, along each axis
 constexpr int kRayStride = 2;
+/// Up to how many good depths away new surface counts in full. One view is not accurate enough
+/// there, but covers much; the views after it make it better.
+constexpr double kNewSurfaceDepth = 1.5;
 constexpr float kFar = std::numeric_limits<float>::infinity();
 
 }  // namespace
@@ -76,7 +79,8 @@ ViewScorer::Benefit ViewScorer::benefit(const RiftRecord& record,
     const double angleQuality = std::clamp((angle - 0.2) / 0.35, 0.0, 1.0);
     // New surface is worth something from afar too; known surface gets better only from where the
     // view measures well.
-    const double torn = distance <= goodDepth_ ? 1.0 : std::pow(goodDepth_ / distance, 2);
+    const double afar = kNewSurfaceDepth * goodDepth_;
+    const double torn = distance <= afar ? 1.0 : std::pow(afar / distance, 2);
     const double coarse = std::clamp((1.6 * goodDepth_ - distance) / (0.6 * goodDepth_), 0.0, 1.0);
     const double vain = std::pow(0.6, record.attempts.size());
     const double cell = summary_->cellSize();
@@ -210,7 +214,7 @@ ViewScore ViewScorer::score(const Pose& world_T_camera) const {
     std::sort(result.cells.begin(), result.cells.end());
     const double side = static_cast<double>(kPixels * kRayStride) / camera.fx;
     forEachUnknown(world_T_camera, buffer, [&](const Eigen::Vector3d&, double depth) {
-        const double z = std::min(depth, goodDepth_);
+        const double z = std::min(depth, kNewSurfaceDepth * goodDepth_);
         result.unknownGain += side * side * z * z;
     });
     result.unknownGain *= weights_.unknown;
