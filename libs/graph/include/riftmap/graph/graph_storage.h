@@ -79,7 +79,7 @@ struct Page {
 /// A cube of space and the pages that hold its vertices.
 struct Block {
     std::array<std::int32_t, 3> key{};  ///< floor(position / blockSize) at creation of a vertex
-    PageBounds bounds;                      ///< of its vertices; fusion may leave the cube
+    PageBounds bounds;                  ///< of its vertices; fusion may leave the cube
     std::vector<std::uint32_t> pages;   ///< ascending in age
     std::uint32_t vertices = 0;
 };
@@ -238,7 +238,7 @@ class GraphStorage {
     double blockSize_;
     std::vector<std::unique_ptr<PageChunk>> chunks_;
     std::uint32_t pageCount_ = 0;
-    std::vector<PageBounds> bounds_;            ///< of pages
+    std::vector<PageBounds> bounds_;        ///< of pages
     std::vector<std::uint32_t> freePages_;  ///< a heap, smallest on top: as after loading
     std::vector<Block> blocks_;
     std::unordered_map<std::array<std::int32_t, 3>, std::uint32_t, KeyHash> blockOfKey_;
