@@ -145,8 +145,8 @@ void Association::projectPage(const GraphStorage& storage, const ViewPoints& vie
               v < bottom + kBorder)) {
             continue;
         }
-        const int column = std::clamp(compact::roundPixel(u), 0, view.width - 1);
-        const int row = std::clamp(compact::roundPixel(v), 0, view.height - 1);
+        const int column = std::clamp(compact::roundNearest(u), 0, view.width - 1);
+        const int row = std::clamp(compact::roundNearest(v), 0, view.height - 1);
         const std::size_t tile =
             static_cast<std::size_t>(row / kTile) * static_cast<std::size_t>(tileColumns_) +
             static_cast<std::size_t>(column / kTile);

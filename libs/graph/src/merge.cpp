@@ -175,7 +175,7 @@ void Merger::fuse(const View& view, Page& page, std::uint32_t slot, std::uint32_
         for (std::size_t i = 0; i < 3; ++i) {
             const float before = page.rgb[slot][i];
             page.rgb[slot][i] = static_cast<std::uint8_t>(
-                before + gain * (static_cast<float>(colour[i]) - before) + 0.5F);
+                compact::roundNearest(before + gain * (static_cast<float>(colour[i]) - before)));
         }
         const float spacing = points_.z[pixel] * points_.footprint;
         if (points_.sigma[pixel] > kNoisy * spacing) {
@@ -214,8 +214,8 @@ void Merger::fuse(const View& view, Page& page, std::uint32_t slot, std::uint32_
 }
 
 bool Merger::lookedThrough(const Candidate& candidate) const {
-    const int column = compact::roundPixel(candidate.u);
-    const int row = compact::roundPixel(candidate.v);
+    const int column = compact::roundNearest(candidate.u);
+    const int row = compact::roundNearest(candidate.v);
     if (column < 1 || row < 1 || column + 1 >= points_.width || row + 1 >= points_.height) {
         return false;
     }
@@ -245,7 +245,7 @@ void Merger::passOver(Page& page, std::uint32_t slot, std::uint32_t candidate, P
         }
         return;
     }
-    const int column = compact::roundPixel(seen.u), row = compact::roundPixel(seen.v);
+    const int column = compact::roundNearest(seen.u), row = compact::roundNearest(seen.v);
     if (column < 0 || row < 0 || column >= points_.width || row >= points_.height) {
         return;
     }

@@ -25,8 +25,8 @@ bool seenThrough(const ViewPoints& view, const Eigen::Vector3f& a, const Eigen::
     if (!(std::max({std::abs(ua), std::abs(va), std::abs(ub), std::abs(vb)}) < longest)) {
         return false;  // most of it lies outside the image
     }
-    const int ca = compact::roundPixel(ua), ra = compact::roundPixel(va);
-    const int cb = compact::roundPixel(ub), rb = compact::roundPixel(vb);
+    const int ca = compact::roundNearest(ua), ra = compact::roundNearest(va);
+    const int cb = compact::roundNearest(ub), rb = compact::roundNearest(vb);
     const bool paper = options.fusion == GraphOptions::Fusion::kFirst;
     const int length = std::max(std::abs(cb - ca), std::abs(rb - ra));
     const bool skipEnds = !paper && length >= 2;
