@@ -125,11 +125,11 @@ void BuildProgram::arguments(CommandLine& line) {
 /// One run: everything that lives from the first view to the last.
 class BuildProgram::Run {
  public:
-    Run(BuildProgram& program, RunDirectory directory)
+    Run(BuildProgram& program, RunDirectory directory, ViewBuilder builder)
         : program_(program),
           directory_(std::move(directory)),
           recorder_(directory_, false),
-          builder_(program.stereo_),
+          builder_(std::move(builder)),
           map_(program.graph_, program.stereo_) {
         if (program.output_.simplemap) {
             simplemap_ = std::make_unique<SimpleMapWriter>(directory_.file("keyframes.simplemap"));
@@ -280,8 +280,12 @@ void printTable(const BuildProgram::Figures& first, const BuildProgram::Figures&
 }
 
 void printPlan(const PaperPlan& plan) {
-    if (plan.poses.empty()) {
+    if (plan.dominant == PaperPlan::kNone) {
         std::printf("\nNo rift that the graph leads to: nothing is left to look at.\n");
+        return;
+    }
+    if (plan.poses.empty()) {
+        std::printf("\nThe dominant rift has no normal to look along.\n");
         return;
     }
     const Pose& view = plan.poses.back();
@@ -303,21 +307,26 @@ void BuildProgram::run() {
     if (!poses_.empty()) {
         inputs.push_back(poses_);
     }
-    Run run(*this, makeRunDirectory(inputs));
+    // What is wrong with the options or the first view shows before anything is written.
+    ViewBuilder builder(stereo_);
+    auto observation = reader.next();
+    if (!observation) {
+        throw RawlogError(file.string() + ": none of its " +
+                          std::to_string(reader.expectedViews()) +
+                          " pairs has a pose at its time (see Input.max_pose_gap)");
+    }
+    Run run(*this, makeRunDirectory(inputs), std::move(builder));
     std::exception_ptr failure;
     const InterruptGuard interrupt;
     try {
         Progress bar("building", "views", reader.expectedViews(), progress());
         // The next pair is read and rectified while this one is mapped.
         const auto fetch = [&reader] { return reader.next(); };
-        auto ahead = std::async(std::launch::async, fetch);
-        while (const auto observation = ahead.get()) {
-            if (interrupt.requested()) {
-                break;
-            }
-            ahead = std::async(std::launch::async, fetch);
+        while (observation && !interrupt.requested()) {
+            auto ahead = std::async(std::launch::async, fetch);
             run.add(*observation);
             bar.update(run.views());
+            observation = ahead.get();
         }
     } catch (const std::exception&) {
         failure = std::current_exception();
@@ -326,9 +335,7 @@ void BuildProgram::run() {
         if (failure) {
             std::rethrow_exception(failure);
         }
-        throw RawlogError(file.string() + ": none of its " +
-                          std::to_string(reader.expectedViews()) +
-                          " pairs has a pose at its time (see Input.max_pose_gap)");
+        throw std::runtime_error("interrupted before the first view");
     }
     // Whatever happened, what was mapped so far is kept.
     const bool stopped = interrupt.requested();

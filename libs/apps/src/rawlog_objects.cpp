@@ -32,12 +32,16 @@ mrpt::serialization::CSerializable::Ptr RawlogObjects::next() {
         auto object = archive.ReadObject();
         ++count_;
         return object;
-    } catch (const mrpt::serialization::CExceptionEOF&) {
-        if (count_ == 0) {
+    } catch (const std::exception& e) {
+        // MRPT says "end of file" for some cuts in the middle of an object, too.
+        const bool ended = dynamic_cast<const mrpt::serialization::CExceptionEOF*>(&e) != nullptr &&
+                           stream_.getPosition() == start_;
+        if (ended && count_ == 0) {
             throw RawlogError(file_.string() + ": no objects in it");
         }
-        return nullptr;
-    } catch (const std::exception& e) {
+        if (ended) {
+            return nullptr;
+        }
         if (count_ == 0) {
             throw RawlogError(file_.string() + ": not a rawlog: " + oneLine(e.what()));
         }

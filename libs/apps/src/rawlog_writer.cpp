@@ -10,6 +10,7 @@
 #include <cstdio>
 #include <numbers>
 #include <opencv2/imgcodecs.hpp>
+#include <system_error>
 #include <utility>
 
 #include "riftmap/apps/rawlog_objects.h"
@@ -128,7 +129,11 @@ class RawlogWriter::Impl {
             throw FileError(file_.string() + ": " + std::to_string(count_) + " objects written, " +
                             std::to_string(objects.count()) + " arrived: is the disk full?");
         }
-        std::filesystem::rename(part_, file_);
+        std::error_code error;
+        std::filesystem::rename(part_, file_, error);
+        if (error) {
+            throw FileError(file_.string() + ": cannot be written: " + error.message());
+        }
     }
 
  private:

@@ -201,6 +201,7 @@ TEST(Build, BrokenInput) {
         {{good}, 2, {"--out"}},
         {{"--out", out}, 2, {"RAWLOG"}},
         {{good, "--out", out, "--set", "Graph.gamma=-1"}, 2, {"gamma", "-1"}},
+        {{good, "--out", out, "--set", "Stereo.window=10"}, 2, {"window", "10", "odd"}},
         {{good, "--out", out, "--poses", "no.tum"}, 1, {"no.tum"}},
     };
     for (const auto& c : cases) {
@@ -212,6 +213,7 @@ TEST(Build, BrokenInput) {
         for (const auto& word : c.says) {
             EXPECT_THAT(error, HasSubstr(word));
         }
+        EXPECT_FALSE(std::filesystem::exists(out)) << "stands in the way of the next try";
         std::filesystem::remove_all(out);
     }
 }

@@ -12,6 +12,7 @@
 #include <cmath>
 #include <limits>
 
+#include "riftmap/apps/rawlog_objects.h"
 #include "riftmap/apps/rawlog_reader.h"
 #include "riftmap/apps/rawlog_writer.h"
 #include "riftmap/apps/simplemap_writer.h"
@@ -270,6 +271,28 @@ TEST(Rawlog, EverythingBeforeACutIsRead) {
         most = views;
     }
     EXPECT_EQ(most, 2U);
+}
+
+/// Not compressed, so that every byte is a place to cut at, also those where MRPT takes what is
+/// left of an object for the end of the file.
+TEST(Rawlog, ACutAtAnyByteIsNoticed) {
+    const TemporaryFolder folder;
+    std::vector<std::uint8_t> object;
+    const auto pose = robotPose(kSecond, 1);
+    mrpt::serialization::ObjectToOctetVector(&pose, object);
+    const std::string bytes(object.begin(), object.end());
+    for (std::size_t n = 1; n < bytes.size(); ++n) {
+        const auto file = folder.write("cut.rawlog", bytes + bytes.substr(0, n));
+        RawlogObjects objects(file);
+        ASSERT_NE(objects.next(), nullptr);
+        EXPECT_THAT(messageOf<RawlogError>([&] { objects.next(); }),
+                    HasSubstr("damaged after object 1"))
+            << "byte " << n << " of " << bytes.size();
+    }
+    RawlogObjects whole(folder.write("whole.rawlog", bytes + bytes));
+    EXPECT_NE(whole.next(), nullptr);
+    EXPECT_NE(whole.next(), nullptr);
+    EXPECT_EQ(whole.next(), nullptr);
 }
 
 TEST(Rawlog, NamesTheObjectThatMakesNoSense) {

@@ -50,7 +50,7 @@ struct RiftRow {
     std::size_t openVertices = 0, edges = 0, attempts = 0;
 };
 
-/// Writes what a mapping run leaves behind into its run directory (design.md section 6): steps.csv
+/// Writes what a mapping run leaves behind into its run directory (doc/file_formats.md): steps.csv
 /// and trajectory.tum grow with each view, so that a run that is killed still has them; the rest
 /// is written by finish(). Not thread-safe.
 class RunRecorder {

@@ -32,8 +32,10 @@ struct GraphOptions {
     enum class Fusion { kFirst, kInverseVariance };
 
     double targetResolution = 0.02;  ///< spacing and 2 sigma the surface is asked to have [m]
-    double delta = 0.0;   ///< weight above which an edge is high [m]; 0 = adaptive (design.md 4)
-    double gamma = 0.01;  ///< association distance [m] (Algorithm 2)
+    /// Weight above which an edge is high [m]; 0 = target resolution plus what noise and viewing
+    /// angle explain.
+    double delta = 0.0;
+    double gamma = 0.01;       ///< association distance [m] (Algorithm 2)
     double visibility = 0.75;  ///< share of an edge that must be seen through (sec. VII)
     Fusion fusion = Fusion::kInverseVariance;  ///< paper: kFirst
     bool typedOpenness = true;  ///< open vertices beyond depth steps; the paper knows only steps
