@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "riftmap/planner/paper_planner.h"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
@@ -57,6 +58,19 @@ VertexId vertexNearestCentre(const PixelGraph& graph, const Rift& rift) {
         }
     }
     return best;
+}
+
+/// Where a way can begin when the vertex nearest to the camera lies on a splinter without a rift.
+VertexId nearestOfLargestRift(const PixelGraph& graph, const Eigen::Vector3d& point) {
+    const auto& rifts = graph.rifts();
+    const auto largest = std::max_element(
+        rifts.begin(), rifts.end(),
+        [](const Rift& a, const Rift& b) { return a.vertices.size() < b.vertices.size(); });
+    const auto nearer = [&](VertexId a, VertexId b) {
+        return (graph.position(a).cast<double>() - point).squaredNorm() <
+               (graph.position(b).cast<double>() - point).squaredNorm();
+    };
+    return *std::min_element(largest->vertices.begin(), largest->vertices.end(), nearer);
 }
 
 SurfaceLine surfaceUnder(const PixelGraph& graph, const GraphPath& path) {
@@ -122,11 +136,15 @@ PaperPlan planPaper(const PixelGraph& graph, const Pose& camera, const PaperPlan
     }
     PaperPlan plan;
     const std::vector<Rift>& rifts = graph.rifts();
-    const auto start = nearestVertex(graph, camera.translation);
+    auto start = nearestVertex(graph, camera.translation);
     if (rifts.empty() || !start) {
         return plan;
     }
-    const std::vector<double> distance = distancesToRifts(graph, *start, search);
+    std::vector<double> distance = distancesToRifts(graph, *start, search);
+    if (std::none_of(distance.begin(), distance.end(), [](double d) { return std::isfinite(d); })) {
+        start = nearestOfLargestRift(graph, camera.translation);
+        distance = distancesToRifts(graph, *start, search);
+    }
     double best = -kInfinity;
     for (std::size_t i = 0; i < rifts.size(); ++i) {
         const double severity = static_cast<double>(rifts[i].highEdges);
@@ -156,9 +174,12 @@ PaperPlan planPaper(const PixelGraph& graph, const Pose& camera, const PaperPlan
             plan.poses.push_back(above(p, n, options.height));
         }
     }
+    const Eigen::Vector3d centre = rift.centre.cast<double>();
+    const Eigen::Vector3d back = camera.translation - centre;
     if (rift.normal.norm() > 0.5F) {
-        plan.poses.push_back(
-            above(rift.centre.cast<double>(), rift.normal.cast<double>(), options.height));
+        plan.poses.push_back(above(centre, rift.normal.cast<double>(), options.height));
+    } else if (back.norm() > 1e-3) {  // too small to have a normal: from the side it was seen from
+        plan.poses.push_back(above(centre, back.normalized(), options.height));
     }
     return plan;
 }

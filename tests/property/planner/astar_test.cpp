@@ -163,6 +163,31 @@ TEST(GraphSearch, looksOnlyTowardsTheGoal) {
     EXPECT_LT(search.expanded(), 200U);  // Dijkstra's circle would hold about 7,000
 }
 
+TEST(GraphSearch, expandsEachVertexOnceAlsoWhereWeightsAreBelowTheStraightDistance) {
+    // As merging leaves them. Searches that take vertices up again did not end on real maps.
+    std::mt19937 random(7);
+    std::uniform_real_distribution<float> factor(0.01F, 1.0F);
+    constexpr VertexId kSide = 60;
+    TestGraph g;
+    for (VertexId i = 0; i < kSide * kSide; ++i) {
+        g.points.emplace_back(static_cast<float>(i % kSide), static_cast<float>(i / kSide), 0.0F);
+    }
+    g.edges.resize(g.points.size());
+    for (VertexId i = 0; i < g.idLimit(); ++i) {
+        if (i % kSide + 1 < kSide) {
+            g.connect(i, i + 1, factor(random));
+        }
+        if (i + kSide < g.idLimit()) {
+            g.connect(i, i + kSide, factor(random));
+        }
+    }
+    GraphSearch search;
+    const auto path = search.shortestPath(g, 0, g.idLimit() - 1);
+    ASSERT_TRUE(path);
+    EXPECT_LE(search.expanded(), g.points.size());
+    EXPECT_NEAR(lengthOf(g, path->vertices), path->length, 1e-9);
+}
+
 TEST(GraphSearch, fromItselfIsAVertexLong) {
     TestGraph g;
     g.points.emplace_back(0.0F, 0.0F, 0.0F);

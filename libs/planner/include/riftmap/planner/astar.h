@@ -28,10 +28,10 @@ struct GraphPath {
 /// from those of earlier ones by a stamp, so a search touches memory only where it goes: buffers
 /// are as large as the largest map searched and are never cleared.
 ///
-/// The path is the shortest one if no weight is below the straight distance of its ends. (Fusion
-/// may move the ends of an edge apart by a fraction of the noise after its weight was set; the path
-/// is then at most that fraction longer.) Equal lengths are broken by the smaller id, so the result
-/// does not depend on anything but the graph. An object serves one thread.
+/// The path is the shortest one if no weight is below the straight distance of its ends. Where
+/// merging has left smaller weights (the smallest ever observed counts) it is a good one: each
+/// vertex is expanded once, whatever the weights. Equal lengths are broken by the smaller id, so
+/// the result does not depend on anything but the graph. An object serves one thread.
 class GraphSearch {
  public:
     /// A* from `source` to `goal`; nothing if there is no way. Both must be alive.
@@ -141,9 +141,11 @@ class GraphSearch {
         const double base = nodes_[id].distance;
         graph.forEachEdge(id, [&](VertexId to, float weight) {
             Node& node = nodes_[to];
+            if (node.stamp == closedStamp()) {
+                return;  // never again: weights below the straight distance would reopen for ever
+            }
             const double distance = base + static_cast<double>(weight);
-            const bool met = node.stamp == openStamp() || node.stamp == closedStamp();
-            if (!met || distance < node.distance) {
+            if (node.stamp != openStamp() || distance < node.distance) {
                 node = {distance, id, openStamp()};
                 push({distance + heuristic(to), to});
             }
