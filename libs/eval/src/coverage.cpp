@@ -16,6 +16,7 @@ namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
+constexpr double kReach = 0.05;  ///< from an uncovered sample to the next, and to a rift [m]
 /// A float comparison must not lose a vertex that lies exactly at delta.
 constexpr double kRounding = 1 + 1e-6;
 
@@ -222,7 +223,10 @@ CoverageReport CoverageJudge::evaluate(std::span<const Eigen::Vector3f> vertices
         report.errorP95 = quantile(errors, 0.95);
     }
     if (rifts != nullptr) {
-        report.explained = explainedShare(sampleDistances(vertices), headline_, *rifts);
+        // One must be able to step from sample to sample: farther where they are sparse.
+        const double spacing = std::sqrt(meshArea_ / static_cast<double>(report.samples));
+        report.explained = explainedShare(sampleDistances(vertices), headline_, *rifts,
+                                          std::max(kReach, 2 * spacing));
     }
     return report;
 }
