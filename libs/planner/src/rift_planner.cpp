@@ -165,7 +165,7 @@ void Choice::addPlaces() {
         return;
     }
     for (int i = 0; i < k_.options().places; ++i) {
-        const Eigen::Vector3d eye = all[random_() % all.size()];
+        const Eigen::Vector3d& eye = all[random_() % all.size()];
         const double start = uniform(0, 2 * kPi);
         for (int j = 0; j < 4; ++j) {
             const double a = start + j * kPi / 2;
