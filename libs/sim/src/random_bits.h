@@ -22,14 +22,14 @@ inline std::uint64_t mixBits(std::uint64_t seed, std::uint64_t index) {
 
 /// Mean 0, variance 1, |x| <= 6: the sum of twelve uniform numbers.
 inline float gaussian(std::uint64_t seed, std::uint64_t index) {
-    std::uint64_t bits = mixBits(seed ^ (index * 0xD1B54A32D192ED03ULL));
-    std::uint64_t sum = 0;
-    for (int i = 0; i < 3; ++i) {
-        sum += (bits & 0xFFFFU) + ((bits >> 16U) & 0xFFFFU) + ((bits >> 32U) & 0xFFFFU) +
-               (bits >> 48U);
-        bits = mixBits(bits);
-    }
-    return (static_cast<float>(sum) + 6.0F) / 65536.0F - 6.0F;
+    constexpr std::uint64_t kEven = 0x0000FFFF0000FFFFULL;  // fields of 16 bits, two at once
+    const std::uint64_t first = mixBits(seed ^ (index * 0xD1B54A32D192ED03ULL));
+    const std::uint64_t second = mixBits(first);
+    const std::uint64_t third = mixBits(second);
+    std::uint64_t sum = (first & kEven) + ((first >> 16U) & kEven) + (second & kEven) +
+                        ((second >> 16U) & kEven) + (third & kEven) + ((third >> 16U) & kEven);
+    sum = (sum & 0xFFFFFFFFU) + (sum >> 32U);
+    return (static_cast<float>(static_cast<std::int32_t>(sum)) + 6.0F) / 65536.0F - 6.0F;
 }
 
 }  // namespace riftmap

@@ -6,6 +6,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "distance.h"
@@ -37,21 +38,29 @@ T* checked(T* pointer) {
     return pointer;
 }
 
-RTCRay makeRay(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double tNear,
-               double tFar) {
-    RTCRay ray{};
+/// In place: a copy of what was just written in other widths would wait for it.
+void setRay(RTCRay& ray, const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
+            double tNear, double tFar) {
     ray.org_x = static_cast<float>(origin.x());
     ray.org_y = static_cast<float>(origin.y());
     ray.org_z = static_cast<float>(origin.z());
+    ray.tnear = static_cast<float>(tNear);
     ray.dir_x = static_cast<float>(direction.x());
     ray.dir_y = static_cast<float>(direction.y());
     ray.dir_z = static_cast<float>(direction.z());
-    ray.tnear = static_cast<float>(tNear);
-    ray.tfar = static_cast<float>(tFar);
     ray.time = 0;
+    ray.tfar = static_cast<float>(tFar);
     ray.mask = ~0U;
+    ray.id = 0;
     ray.flags = 0;
-    return ray;
+}
+
+void setQuery(RTCRayHit& query, const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
+              double tMax) {
+    setRay(query.ray, origin, direction, 0, tMax);
+    query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+    query.hit.primID = RTC_INVALID_GEOMETRY_ID;
+    query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
 }
 
 }  // namespace
@@ -101,8 +110,24 @@ struct RayCaster::Scene {
                 vertices[t[2]].cast<double>()};
     }
 
-    Eigen::Vector3d corner(std::uint32_t triangle) const {
-        return vertices[triangles[triangle][0]].cast<double>();
+    /// What Embree found, made exact: its t is in single precision; the plane gives it in double.
+    void setHit(std::optional<Hit>& out, const RTCRayHit& query, const Eigen::Vector3d& origin,
+                const Eigen::Vector3d& direction) const {
+        if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) {
+            out.reset();
+            return;
+        }
+        Hit& hit = out.emplace();
+        hit.triangle = query.hit.primID;
+        hit.u = query.hit.u;
+        hit.v = query.hit.v;
+        hit.t = static_cast<double>(query.ray.tfar);
+        hit.normal = normals[hit.triangle];  // zero for a triangle without area
+        const double slope = hit.normal.dot(direction);
+        if (slope * slope > 1e-12 * direction.squaredNorm()) {
+            const Eigen::Vector3d corner = vertices[triangles[hit.triangle][0]].cast<double>();
+            hit.t = hit.normal.dot(corner - origin) / slope;
+        }
     }
 
     std::vector<Eigen::Vector3d> normals;  ///< a triangle
@@ -120,74 +145,36 @@ RayCaster::~RayCaster() = default;
 RayCaster::RayCaster(RayCaster&&) noexcept = default;
 RayCaster& RayCaster::operator=(RayCaster&&) noexcept = default;
 
-namespace {
-
-/// What Embree found, made exact: its t is in single precision; the plane gives it in double.
-Hit makeHit(const Eigen::Vector3d& corner, const Eigen::Vector3d& normal,
-            const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, std::uint32_t triangle,
-            float t, float u, float v) {
-    Hit hit;
-    hit.triangle = triangle;
-    hit.u = u;
-    hit.v = v;
-    hit.t = static_cast<double>(t);
-    hit.normal = normal;  // zero for a triangle without area
-    const double slope = normal.dot(direction);
-    if (slope * slope > 1e-12 * direction.squaredNorm()) {
-        hit.t = normal.dot(corner - origin) / slope;
-    }
-    return hit;
-}
-
-}  // namespace
-
 std::optional<Hit> RayCaster::cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
                                    double tMax) const {
     RTCIntersectContext context{};
     rtcInitIntersectContext(&context);
-    RTCRayHit query{};
-    query.ray = makeRay(origin, direction, 0, tMax);
-    query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-    query.hit.primID = RTC_INVALID_GEOMETRY_ID;
-    query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+    RTCRayHit query;
+    setQuery(query, origin, direction, tMax);
     rtcIntersect1(scene_->scene, &context, &query);
-    if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) {
-        return std::nullopt;
-    }
-    return makeHit(scene_->corner(query.hit.primID), scene_->normals[query.hit.primID], origin,
-                   direction, query.hit.primID, query.ray.tfar, query.hit.u, query.hit.v);
+    std::optional<Hit> hit;
+    scene_->setHit(hit, query, origin, direction);
+    return hit;
 }
 
-void RayCaster::cast4(const Eigen::Vector3d& origin, const Eigen::Vector3d* directions,
-                      std::size_t count, std::optional<Hit>* hits) const {
+void RayCaster::castBundle(const Eigen::Vector3d& origin,
+                           std::span<const Eigen::Vector3d> directions,
+                           std::span<std::optional<Hit>> hits) const {
+    constexpr std::size_t kMost = 256;
+    std::array<RTCRayHit, kMost> queries;  // 20 kB: stays in the cache of a core
     RTCIntersectContext context{};
     rtcInitIntersectContext(&context);
     context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-    alignas(16) RTCRayHit4 query{};
-    alignas(16) int valid[4];
-    for (std::size_t i = 0; i < 4; ++i) {
-        valid[i] = i < count ? -1 : 0;
-        const Eigen::Vector3d& d = directions[std::min(i, count - 1)];
-        query.ray.org_x[i] = static_cast<float>(origin.x());
-        query.ray.org_y[i] = static_cast<float>(origin.y());
-        query.ray.org_z[i] = static_cast<float>(origin.z());
-        query.ray.dir_x[i] = static_cast<float>(d.x());
-        query.ray.dir_y[i] = static_cast<float>(d.y());
-        query.ray.dir_z[i] = static_cast<float>(d.z());
-        query.ray.tfar[i] = std::numeric_limits<float>::infinity();
-        query.ray.mask[i] = ~0U;
-        query.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
-        query.hit.primID[i] = RTC_INVALID_GEOMETRY_ID;
-        query.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
-    }
-    rtcIntersect4(valid, scene_->scene, &context, &query);
-    for (std::size_t i = 0; i < count; ++i) {
-        hits[i].reset();
-        if (query.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID) {
-            hits[i] =
-                makeHit(scene_->corner(query.hit.primID[i]), scene_->normals[query.hit.primID[i]],
-                        origin, directions[i], query.hit.primID[i], query.ray.tfar[i],
-                        query.hit.u[i], query.hit.v[i]);
+    for (std::size_t begin = 0; begin < directions.size(); begin += kMost) {
+        const std::size_t count = std::min(kMost, directions.size() - begin);
+        for (std::size_t i = 0; i < count; ++i) {
+            setQuery(queries[i], origin, directions[begin + i],
+                     std::numeric_limits<double>::infinity());
+        }
+        rtcIntersect1M(scene_->scene, &context, queries.data(), static_cast<unsigned>(count),
+                       sizeof(RTCRayHit));
+        for (std::size_t i = 0; i < count; ++i) {
+            scene_->setHit(hits[begin + i], queries[i], origin, directions[begin + i]);
         }
     }
 }
@@ -200,7 +187,8 @@ bool RayCaster::occluded(const Eigen::Vector3d& a, const Eigen::Vector3d& b, dou
     }
     RTCIntersectContext context{};
     rtcInitIntersectContext(&context);
-    RTCRay ray = makeRay(a, d, margin / length, 1 - margin / length);
+    RTCRay ray;
+    setRay(ray, a, d, margin / length, 1 - margin / length);
     rtcOccluded1(scene_->scene, &context, &ray);
     return ray.tfar < 0;
 }

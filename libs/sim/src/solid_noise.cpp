@@ -117,32 +117,20 @@ namespace riftmap {
 
 HWY_EXPORT(solidNoiseAll);
 
-void NoiseQueries::clear() {
+void NoiseQueries::resize(std::size_t count) {
     for (auto* v : {&x, &y, &z, &size, &footprint}) {
-        v->clear();
+        v->resize(count, 1.0F);
     }
-}
-
-void NoiseQueries::add(const Eigen::Vector3f& point, float blotchSize, float pixelFootprint) {
-    x.push_back(point.x());
-    y.push_back(point.y());
-    z.push_back(point.z());
-    size.push_back(blotchSize);
-    footprint.push_back(pixelFootprint);
 }
 
 void solidNoise(NoiseQueries& queries, std::vector<float>& noise) {
     const std::size_t n = queries.count();
     const std::size_t padded = (n + 15) / 16 * 16;
-    for (auto* v : {&queries.x, &queries.y, &queries.z, &queries.size, &queries.footprint}) {
-        v->resize(padded, 1.0F);
-    }
+    queries.resize(padded);
     noise.resize(padded);
     HWY_DYNAMIC_DISPATCH(solidNoiseAll)(queries, padded, noise.data());
-    for (auto* v :
-         {&queries.x, &queries.y, &queries.z, &queries.size, &queries.footprint, &noise}) {
-        v->resize(n);
-    }
+    queries.resize(n);
+    noise.resize(n);
 }
 
 const Eigen::Matrix3f& noiseRotation(std::size_t octave) {

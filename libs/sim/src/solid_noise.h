@@ -13,8 +13,14 @@ struct NoiseQueries {
     std::vector<float> size;       ///< of the coarsest blotches [m], > 0
     std::vector<float> footprint;  ///< of the pixel [m], > 0
 
-    void clear();
-    void add(const Eigen::Vector3f& point, float blotchSize, float pixelFootprint);
+    void resize(std::size_t count);
+    void set(std::size_t i, const Eigen::Vector3f& point, float blotchSize, float pixelFootprint) {
+        x[i] = point.x();
+        y[i] = point.y();
+        z[i] = point.z();
+        size[i] = blotchSize;
+        footprint[i] = pixelFootprint;
+    }
     std::size_t count() const { return x.size(); }
 };
 

@@ -39,11 +39,18 @@ struct Batch {
     std::vector<float> noise;
 };
 
-/// Calls body(row, scratch) for all rows, several at once.
+/// Of a whole image.
+struct Frame {
+    std::vector<PixelHit> seen;
+    std::vector<Eigen::Vector3f> colours;  ///< lit
+};
+
+/// Calls body(row, scratch) for all rows, several at once. The scratch stays with its thread, for
+/// fresh memory is slow; so a body must not wait for other tasks.
 template <class Body>
 void forEachRow(int rows, const Body& body) {
     parallelFor(static_cast<std::size_t>(rows), 4, [&](std::size_t begin, std::size_t end) {
-        Batch scratch;
+        thread_local Batch scratch;
         for (std::size_t row = begin; row < end; ++row) {
             body(static_cast<int>(row), scratch);
         }
@@ -128,9 +135,11 @@ struct StereoRenderer::Parts {
     bool onEdge(const std::vector<PixelHit>& hits, int column, int row) const;
     void smoothEdges(const Pose& pose, const std::vector<PixelHit>& seen, int row,
                      Eigen::Vector3f* line, Batch& batch) const;
-    cv::Mat render(const Pose& pose, std::uint64_t noiseSeed) const;
-    void expose(const Eigen::Vector3f& colour, int column, int row, std::uint64_t noiseSeed,
-                bool sensor, cv::Mat& image) const;
+    cv::Mat render(const Pose& pose, std::uint64_t noiseSeed, Frame& frame) const;
+    /// Brings a row of colours to what the sensor says; without noise and vignetting if not
+    /// `sensor`.
+    void expose(const Eigen::Vector3f* line, int row, std::uint64_t noiseSeed, bool sensor,
+                cv::Mat& image) const;
     bool hiddenFromRight(const Pose& left, const Point& inCamera, const Point& inWorld) const;
 
     const RayCaster& caster;
@@ -172,9 +181,7 @@ void StereoRenderer::Parts::cast(const Pose& pose, Batch& b) const {
     for (std::size_t i = 0; i < n; ++i) {
         b.rays[i] = pose.rotation * direction(b.pixels[i].x(), b.pixels[i].y());
     }
-    for (std::size_t i = 0; i < n; i += 4) {
-        caster.cast4(pose.translation, &b.rays[i], std::min<std::size_t>(4, n - i), &b.hits[i]);
-    }
+    caster.castBundle(pose.translation, b.rays, b.hits);
 }
 
 /// Finds the colours of the batch's pixels after cast().
@@ -182,7 +189,7 @@ void StereoRenderer::Parts::shade(const Pose& pose, Batch& b, bool withNoise) co
     const std::size_t n = b.pixels.size();
     b.seen.assign(n, PixelHit());
     b.colours.assign(n, Eigen::Vector3f(0.92F, 0.97F, 1.05F) * kSky);
-    b.queries.clear();
+    b.queries.resize(n);
     b.noisy.clear();
     for (std::size_t i = 0; i < n; ++i) {
         if (!b.hits[i]) {
@@ -200,10 +207,12 @@ void StereoRenderer::Parts::shade(const Pose& pose, Batch& b, bool withNoise) co
         b.colours[i] = appearance.colour(hit, point, size) * light(normal);
         const Material* material = withNoise ? appearance.noiseOf(hit.triangle) : nullptr;
         if (material != nullptr) {
-            b.queries.add(point.cwiseQuotient(material->grain), material->noiseSize, size);
+            b.queries.set(b.noisy.size(), point.cwiseQuotient(material->grain), material->noiseSize,
+                          size);
             b.noisy.push_back({i, material->noise});
         }
     }
+    b.queries.resize(b.noisy.size());
     solidNoise(b.queries, b.noise);
     for (std::size_t k = 0; k < b.noisy.size(); ++k) {
         const auto& [i, strength] = b.noisy[k];
@@ -246,40 +255,41 @@ bool StereoRenderer::Parts::onEdge(const std::vector<PixelHit>& hits, int column
            differs(column, row + 1);
 }
 
-void StereoRenderer::Parts::expose(const Eigen::Vector3f& colour, int column, int row,
-                                   std::uint64_t noiseSeed, bool sensor, cv::Mat& image) const {
-    float gain = 255;
-    float sigma = 0;
-    if (sensor) {
-        const auto dx = static_cast<float>((column - camera.cx) / camera.cx);
-        const auto dy = static_cast<float>((row - camera.cy) / camera.cy);
-        gain *= 1 - static_cast<float>(options.vignetting) * 0.5F * (dx * dx + dy * dy);
-        sigma = static_cast<float>(options.sensorNoise);
-    }
-    const auto pixel = static_cast<std::uint64_t>(row) * static_cast<std::uint64_t>(camera.width) +
-                       static_cast<std::uint64_t>(column);
-    const auto level = [&](float brightness, std::uint64_t channel) {
-        float value = brightness * gain;
+void StereoRenderer::Parts::expose(const Eigen::Vector3f* line, int row, std::uint64_t noiseSeed,
+                                   bool sensor, cv::Mat& image) const {
+    const float sigma = sensor ? static_cast<float>(options.sensorNoise) : 0.0F;
+    const float falloff = sensor ? static_cast<float>(options.vignetting) * 0.5F : 0.0F;
+    const auto dy = static_cast<float>((row - camera.cy) / camera.cy);
+    const auto first = static_cast<std::uint64_t>(row) * static_cast<std::uint64_t>(camera.width);
+    const auto level = [&](float value, std::uint64_t column, std::uint64_t channel) {
         if (sigma > 0) {
-            value += sigma * gaussian(noiseSeed, 4 * pixel + channel);
+            value += sigma * gaussian(noiseSeed, 4 * (first + column) + channel);
         }
         return static_cast<unsigned char>(std::clamp(value + 0.5F, 0.0F, 255.0F));
     };
-    if (image.channels() == 3) {
-        auto& bgr = image.ptr<cv::Vec3b>(row)[column];
-        for (int k = 0; k < 3; ++k) {
-            bgr[k] = level(colour[2 - k], static_cast<std::uint64_t>(k));
+    unsigned char* out = image.ptr<unsigned char>(row);
+    const bool colour = image.channels() == 3;
+    for (int column = 0; column < camera.width; ++column) {
+        const auto dx = static_cast<float>((column - camera.cx) / camera.cx);
+        const float gain = 255 * (1 - falloff * (dx * dx + dy * dy));
+        const Eigen::Vector3f& rgb = line[column];
+        const auto at = static_cast<std::uint64_t>(column);
+        if (colour) {
+            for (int k = 0; k < 3; ++k) {  // blue, green, red
+                *out++ = level(rgb[2 - k] * gain, at, static_cast<std::uint64_t>(k));
+            }
+        } else {
+            *out++ = level((0.299F * rgb[0] + 0.587F * rgb[1] + 0.114F * rgb[2]) * gain, at, 0);
         }
-    } else {
-        image.ptr<unsigned char>(row)[column] =
-            level(0.299F * colour[0] + 0.587F * colour[1] + 0.114F * colour[2], 0);
     }
 }
 
-cv::Mat StereoRenderer::Parts::render(const Pose& pose, std::uint64_t noiseSeed) const {
+cv::Mat StereoRenderer::Parts::render(const Pose& pose, std::uint64_t noiseSeed,
+                                      Frame& frame) const {
     const auto width = static_cast<std::size_t>(camera.width);
-    std::vector<PixelHit> seen(width * static_cast<std::size_t>(camera.height));
-    std::vector<Eigen::Vector3f> colours(seen.size());
+    auto& [seen, colours] = frame;
+    seen.resize(width * static_cast<std::size_t>(camera.height));
+    colours.resize(seen.size());
     forEachRow(camera.height, [&](int row, Batch& b) {
         castRow(pose, row, b);
         shade(pose, b, true);
@@ -291,9 +301,7 @@ cv::Mat StereoRenderer::Parts::render(const Pose& pose, std::uint64_t noiseSeed)
     forEachRow(camera.height, [&](int row, Batch& b) {
         Eigen::Vector3f* line = &colours[static_cast<std::size_t>(row) * width];
         smoothEdges(pose, seen, row, line, b);
-        for (int column = 0; column < camera.width; ++column) {
-            expose(line[column], column, row, noiseSeed, true, image);
-        }
+        expose(line, row, noiseSeed, true, image);
     });
     return image;
 }
@@ -353,8 +361,9 @@ StereoRenderer::~StereoRenderer() = default;
 StereoRenderer::Pair StereoRenderer::renderPair(const Pose& world_T_left,
                                                 std::uint64_t noiseSeed) const {
     const Pose left_T_right{Eigen::Matrix3d::Identity(), Point(camera_.baseline, 0, 0)};
-    return {parts_->render(world_T_left, mixBits(noiseSeed, 0)),
-            parts_->render(world_T_left * left_T_right, mixBits(noiseSeed, 1))};
+    Frame frame;  // one for both images
+    return {parts_->render(world_T_left, mixBits(noiseSeed, 0), frame),
+            parts_->render(world_T_left * left_T_right, mixBits(noiseSeed, 1), frame)};
 }
 
 Truth StereoRenderer::truth(const Pose& world_T_left, bool withNormals,
@@ -399,10 +408,7 @@ cv::Mat StereoRenderer::renderQuick(const Pose& world_T_left) const {
     forEachRow(camera_.height, [&](int row, Batch& b) {
         parts_->castRow(world_T_left, row, b);
         parts_->shade(world_T_left, b, false);
-        for (int column = 0; column < camera_.width; ++column) {
-            parts_->expose(b.colours[static_cast<std::size_t>(column)], column, row, 0, false,
-                           image);
-        }
+        parts_->expose(b.colours.data(), row, 0, false, image);
     });
     return image;
 }

@@ -66,6 +66,35 @@ class RandomScene : public testing::Test {
     TriangleMesh mesh_;
 };
 
+TEST_F(RandomScene, BundlesHitWhatSingleRaysHit) {
+    const RayCaster caster(mesh_);
+    int hits = 0;
+    int others = 0;  // at a common edge of two triangles, or where the rounding differs
+    for (const std::size_t count : {0U, 1U, 3U, 255U, 256U, 257U, 1000U}) {
+        const Eigen::Vector3d o = 3 * anywhere();
+        const Eigen::Vector3d middle = -o;
+        std::vector<Eigen::Vector3d> directions;
+        for (std::size_t i = 0; i < count; ++i) {
+            directions.emplace_back(middle + anywhere());
+        }
+        std::vector<std::optional<Hit>> found(count, Hit());
+        caster.castBundle(o, directions, found);
+        for (std::size_t i = 0; i < count; ++i) {
+            const auto expected = caster.cast(o, directions[i]);
+            if (found[i].has_value() != expected.has_value()) {
+                ++others;
+                continue;
+            }
+            if (expected) {
+                ++hits;
+                others += std::abs(found[i]->t - expected->t) > 1e-9 ? 1 : 0;
+            }
+        }
+    }
+    EXPECT_GT(hits, 300);
+    EXPECT_LE(others, 2);
+}
+
 TEST_F(RandomScene, FirstHitIsTheNearestOfAll) {
     const RayCaster caster(mesh_);
     int hits = 0;

@@ -64,8 +64,9 @@ TEST(SolidNoise, VectorCodeGivesTheBitsOfPlainCode) {
     std::uniform_real_distribution<float> footprint(5e-4F, 0.2F);
     for (const std::size_t count : {0U, 1U, 15U, 16U, 17U, 1000U}) {
         NoiseQueries queries;
+        queries.resize(count);
         for (std::size_t i = 0; i < count; ++i) {
-            queries.add({place(random), place(random), place(random)}, size(random),
+            queries.set(i, {place(random), place(random), place(random)}, size(random),
                         footprint(random));
         }
         std::vector<float> noise;
@@ -83,8 +84,9 @@ TEST(SolidNoise, HasContrastAtEveryScaleAndNoneBelowThePixel) {
     std::uniform_real_distribution<float> place(-30, 30);
     const auto deviation = [&](float size, float footprint) {
         NoiseQueries queries;
-        for (int i = 0; i < 4000; ++i) {
-            queries.add({place(random), place(random), place(random)}, size, footprint);
+        queries.resize(4000);
+        for (std::size_t i = 0; i < queries.count(); ++i) {
+            queries.set(i, {place(random), place(random), place(random)}, size, footprint);
         }
         std::vector<float> noise;
         solidNoise(queries, noise);

@@ -7,6 +7,7 @@
 #include <limits>
 #include <memory>
 #include <optional>
+#include <span>
 
 #include "riftmap/sim/mesh.h"
 
@@ -43,11 +44,11 @@ class RayCaster {
     std::optional<Hit> cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
                             double tMax = std::numeric_limits<double>::infinity()) const;
 
-    /// The same for up to four rays from one origin (1 <= count <= 4) that run side by side, as
-    /// those of neighbouring pixels do: about twice as fast. Where a ray runs exactly through an
-    /// edge it may name the other triangle than `cast`.
-    void cast4(const Eigen::Vector3d& origin, const Eigen::Vector3d* directions, std::size_t count,
-               std::optional<Hit>* hits) const;
+    /// The same for many rays from one origin that run side by side, as those of a row of pixels
+    /// do: more than twice as fast. Where a ray runs exactly through an edge it may name the other
+    /// triangle than `cast`.
+    void castBundle(const Eigen::Vector3d& origin, std::span<const Eigen::Vector3d> directions,
+                    std::span<std::optional<Hit>> hits) const;
 
     /// True if a surface lies strictly between a and b. Surfaces within `margin` [m] of either end
     /// do not count, so that a point on the surface does not hide itself.
