@@ -239,11 +239,7 @@ void EvalProgram::run() {
         inputs.emplace_back(simulation_.world.mesh);
     }
     const RunDirectory directory = makeRunDirectory(inputs);
-    if (eval_.cache.empty()) {
-        eval_.cache = (fs::temp_directory_path() / "riftmap-observable").string();
-    } else if (eval_.cache == "none") {
-        eval_.cache.clear();
-    }
+    eval_.resolveCache();
     const CoverageJudge judge(
         platform.world().mesh, platform.rayCaster(),
         viewSpaceOf(platform.limits(), platform.camera(), platform.pose().translation), eval_);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iostream>
+#include <limits>
 #include <sstream>
 #include <utility>
 
@@ -99,10 +100,12 @@ ExploreRun::ExploreRun(ExploreProgram& program, RunDirectory& directory)
     }
     planner_ = makePlanner();
     if (program.explore_.judge) {
+        program.eval_.resolveCache();
         const ViewSpace space =
             viewSpaceOf(platform_->limits(), platform_->camera(), platform_->pose().translation);
         judge_ = std::make_unique<CoverageJudge>(platform_->world().mesh, platform_->rayCaster(),
                                                  space, program.eval_);
+        tracker_ = std::make_unique<CoverageTracker>(*judge_);
         std::vector<std::string> names = {"view", "path_length_m", "expected_gain_m2"};
         for (const double delta : judge_->deltas()) {
             names.push_back("c_obs_" + deltaName(delta));
@@ -164,21 +167,24 @@ std::size_t ExploreRun::headlineIndex() const {
     return i;
 }
 
-void ExploreRun::collectVertices(bool withNormals) {
+void ExploreRun::collectVertices() {
     points_.clear();
     normals_.clear();
     colours_.clear();
     points_.reserve(graph().vertexCount());
     graph().forEachVertex([&](VertexId id) {
-        if (withNormals) {
-            const Vertex v = graph().vertex(id);
-            points_.push_back(v.position);
-            normals_.push_back(v.normal);
-            colours_.push_back(v.rgb);
-        } else {
-            points_.push_back(graph().position(id));
-        }
+        const Vertex v = graph().vertex(id);
+        points_.push_back(v.position);
+        normals_.push_back(v.normal);
+        colours_.push_back(v.rgb);
     });
+}
+
+std::vector<Coverage> ExploreRun::coverageNow() {
+    const float nowhere = std::numeric_limits<float>::quiet_NaN();
+    points_.assign(graph().idLimit(), Eigen::Vector3f::Constant(nowhere));
+    graph().forEachVertex([&](VertexId id) { points_[id] = graph().position(id); });
+    return tracker_->update(points_);
 }
 
 void ExploreRun::onStep(const ExploreStep& step, const Knowledge& knowledge) {
@@ -198,8 +204,7 @@ void ExploreRun::onStep(const ExploreStep& step, const Knowledge& knowledge) {
     row.riftsMs = step.riftsMs;
     row.planMs = step.planMs;
     if (judge_) {
-        collectVertices(false);
-        figures.coverage = judge_->coverage(points_);
+        figures.coverage = coverageNow();
         std::vector<Field> fields = {step.view, step.pathLength, step.gain};
         for (const Coverage& c : figures.coverage) {
             fields.emplace_back(c.cObs);
@@ -212,7 +217,7 @@ void ExploreRun::onStep(const ExploreStep& step, const Knowledge& knowledge) {
     history_.push_back(std::move(figures));
     if (program_.explore_.pictureEvery > 0 &&
         history_.size() % static_cast<std::size_t>(program_.explore_.pictureEvery) == 0) {
-        collectVertices(true);
+        collectVertices();
         writePicture(directory_.file("map_" + std::to_string(history_.size()) + ".png"),
                      cutawayPicture(points_, normals_, colours_, taken_));
     }
@@ -257,7 +262,7 @@ void ExploreRun::finish(const std::string& error) {
     if (rawlog_) {
         rawlog_->finish();
     }
-    collectVertices(true);
+    collectVertices();
     SceneExtras scene;
     scene.taken = taken_;
     const YamlMap more = figures(error);

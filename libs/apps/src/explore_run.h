@@ -14,6 +14,7 @@
 #include "riftmap/core/csv.h"
 #include "riftmap/core/run_directory.h"
 #include "riftmap/eval/baselines.h"
+#include "riftmap/eval/coverage_tracker.h"
 #include "riftmap/maps/pixel_graph_map.h"
 #include "riftmap/stereo/view_builder.h"
 
@@ -40,7 +41,8 @@ class ExploreRun {
     void showProgress(const ExploreStep& step, const Knowledge& knowledge) const;
     void finish(const std::string& error);
     void writeReport() const;
-    void collectVertices(bool withNormals);
+    void collectVertices();
+    std::vector<Coverage> coverageNow();
     std::size_t headlineIndex() const;
     PixelGraph& graph() { return map_.graph(); }
     const PixelGraph& graph() const { return map_.graph(); }
@@ -53,6 +55,7 @@ class ExploreRun {
     RunRecorder recorder_;
     Eigen::AlignedBox3d target_;  ///< box of an object that stands alone; else empty
     std::unique_ptr<CoverageJudge> judge_;
+    std::unique_ptr<CoverageTracker> tracker_;
     std::unique_ptr<ViewPlanner> planner_;
     std::unique_ptr<RawlogWriter> rawlog_;
     std::unique_ptr<SurfaceExplorer> explorer_;

@@ -17,8 +17,6 @@ namespace {
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr double kReach = 0.05;  ///< from an uncovered sample to the next, and to a rift [m]
-/// A float comparison must not lose a vertex that lies exactly at delta.
-constexpr double kRounding = 1 + 1e-6;
 
 struct Distances {
     std::vector<double> deltas;
@@ -113,7 +111,7 @@ CoverageJudge::CoverageJudge(const TriangleMesh& mesh, const RayCaster& caster,
 }
 
 std::vector<float> CoverageJudge::sampleDistances(std::span<const Eigen::Vector3f> vertices) const {
-    const auto reach = static_cast<float>(std::max(deltas_.back(), headline_) * kRounding);
+    const auto reach = coverageLimit(std::max(deltas_.back(), headline_));
     const PointIndex index(vertices, reach, bounds_);
     std::vector<float> out(samples_.points.size());
     tbb::parallel_for(std::size_t{0}, out.size(), [&](std::size_t i) {
@@ -127,7 +125,7 @@ std::vector<Coverage> CoverageJudge::coverage(std::span<const Eigen::Vector3f> v
     const std::vector<float> distances = sampleDistances(vertices);
     std::vector<Coverage> out;
     for (const double delta : deltas_) {
-        const auto limit = static_cast<float>(delta * kRounding);
+        const auto limit = coverageLimit(delta);
         std::size_t all = 0;
         std::size_t seen = 0;
         for (std::size_t i = 0; i < distances.size(); ++i) {
@@ -160,7 +158,7 @@ std::vector<float> CoverageJudge::vertexErrors(std::span<const Eigen::Vector3f> 
 std::vector<std::uint8_t> CoverageJudge::strictlyCovered(std::span<const Eigen::Vector3f> vertices,
                                                          std::span<const Eigen::Vector3f> normals,
                                                          double delta) const {
-    const auto reach = static_cast<float>(delta * kRounding);
+    const auto reach = coverageLimit(delta);
     const PointIndex index(vertices, reach, bounds_);
     std::vector<std::uint8_t> out(samples_.points.size());
     tbb::parallel_for(std::size_t{0}, out.size(), [&](std::size_t i) {
@@ -204,7 +202,7 @@ CoverageReport CoverageJudge::evaluate(std::span<const Eigen::Vector3f> vertices
             f.cAllStrict = share(all, report.samples);
         }
         const auto within = [&](double limit) {
-            const auto bound = static_cast<float>(limit * kRounding);
+            const auto bound = coverageLimit(limit);
             return static_cast<std::size_t>(
                 std::count_if(errors.begin(), errors.end(), [&](float e) { return e <= bound; }));
         };
@@ -234,7 +232,7 @@ CoverageReport CoverageJudge::evaluate(std::span<const Eigen::Vector3f> vertices
 double CoverageJudge::explainedShare(const std::vector<float>& sampleDistances, double delta,
                                      const std::vector<Eigen::Vector3f>& rifts,
                                      double reach) const {
-    const auto limit = static_cast<float>(delta * kRounding);
+    const auto limit = coverageLimit(delta);
     std::vector<Eigen::Vector3f> open;
     for (std::size_t i = 0; i < sampleDistances.size(); ++i) {
         if (observable_.observable[i] != 0 && !(sampleDistances[i] <= limit)) {

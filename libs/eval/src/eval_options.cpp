@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "riftmap/eval/eval_options.h"
 
+#include <unistd.h>
+
+#include <filesystem>
+
 namespace riftmap {
 
 void EvalOptions::describe(OptionTable& table) {
@@ -32,6 +36,15 @@ void EvalOptions::describe(OptionTable& table) {
         "Directory that keeps observable sets between runs; none: no such; empty: one among the "
         "temporary files.");
     table.add("strict", strict, "Also coverage of the side seen, with nothing in between.");
+}
+
+void EvalOptions::resolveCache() {
+    if (cache.empty()) {
+        const std::string name = "riftmap-observable-" + std::to_string(getuid());
+        cache = (std::filesystem::temp_directory_path() / name).string();
+    } else if (cache == "none") {
+        cache.clear();
+    }
 }
 
 }  // namespace riftmap

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "riftmap/eval/coverage.h"
+#include "riftmap/eval/coverage_tracker.h"
 #include "riftmap/sim/simulated_platform.h"
 
 namespace riftmap {
@@ -65,6 +66,27 @@ int run(const std::string& file) {
         add("coverage_" + name, times[2]);
         add("errors_" + name, seconds([&] { judge->vertexErrors(part); }));
     }
+    // A map grown by what lies within 1.5 m of a place, a tenth of it moved by later views.
+    CoverageTracker tracker(*judge);
+    std::vector<Eigen::Vector3f> grown;
+    std::vector<Time> times;
+    for (std::size_t view = 0; view < 40; ++view) {
+        const Eigen::Vector3f place = map.points[view * 7919 * 17 % map.points.size()];
+        for (auto& v : grown) {
+            if ((v - place).norm() < 0.5F) {
+                v.x() += 1e-4F;
+            }
+        }
+        for (std::size_t i = view % 10; i < map.points.size(); i += 10) {
+            if ((map.points[i] - place).norm() < 1.5F) {
+                grown.push_back(map.points[i]);
+            }
+        }
+        times.push_back(seconds([&] { tracker.update(grown); }));
+    }
+    std::sort(times.begin(), times.end(),
+              [](const Time& a, const Time& b) { return a.cpu < b.cpu; });
+    add("coverage_after_a_view", times[20]);
     csv.close();
     return csv ? 0 : 1;
 }

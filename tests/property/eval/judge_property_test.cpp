@@ -7,6 +7,7 @@
 #include <random>
 
 #include "riftmap/eval/coverage.h"
+#include "riftmap/eval/coverage_tracker.h"
 #include "riftmap/eval/point_index.h"
 #include "shapes.h"
 
@@ -160,6 +161,49 @@ TEST(CoverageProperty, AgreesWithLookingAtEveryVertex) {
         EXPECT_NEAR(c.cAll * total, static_cast<double>(all), 0.5);
         EXPECT_NEAR(c.cObs * static_cast<double>(judge.observable().count),
                     static_cast<double>(observable), 0.5);
+    }
+}
+
+TEST(CoverageProperty, TheTrackerAgreesWithTheJudgeAfterEveryChange) {
+    for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+        SCOPED_TRACE("seed " + std::to_string(seed));
+        RandomRoom room(seed);
+        room.options.deltas = {0.02, 0.05, 0.1};
+        const RayCaster caster(room.mesh);
+        const CoverageJudge judge(room.mesh, caster, room.space, room.options);
+        CoverageTracker tracker(judge);
+        Random random(seed);
+        const auto& samples = judge.samples().points;
+        const Eigen::Vector3f nowhere = Eigen::Vector3f::Constant(std::nanf(""));
+        Points map;
+        for (int step = 0; step < 30; ++step) {
+            // Near one place vertices come, go and move, as a view makes them; some are far off.
+            const Eigen::Vector3f& place = samples[random() % samples.size()];
+            for (auto& v : map) {
+                if ((v - place).norm() < 0.7F && random() % 2 == 0) {
+                    v = random() % 4 == 0 ? nowhere : (v + pointIn(random, -0.02F, 0.02F)).eval();
+                }
+            }
+            for (int i = 0; i < 400; ++i) {
+                const Eigen::Vector3f& p = samples[random() % samples.size()];
+                if ((p - place).norm() < 0.8F) {
+                    map.push_back(p + pointIn(random, -0.06F, 0.06F));
+                }
+            }
+            map.emplace_back(1e6F * static_cast<float>(step), 0.0F, 0.0F);
+            map.push_back(place + pointIn(random, -3, 3));
+            if (step == 20) {
+                map.resize(map.size() / 2);
+            }
+            const auto quick = tracker.update(map);
+            const auto slow = judge.coverage(map);
+            ASSERT_EQ(quick.size(), slow.size());
+            for (std::size_t k = 0; k < quick.size(); ++k) {
+                ASSERT_EQ(quick[k].cAll, slow[k].cAll) << "step " << step << " delta " << k;
+                ASSERT_EQ(quick[k].cObs, slow[k].cObs) << "step " << step << " delta " << k;
+            }
+        }
+        EXPECT_GT(judge.coverage(map)[1].cAll, 0.02);
     }
 }
 

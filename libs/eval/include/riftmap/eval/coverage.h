@@ -55,6 +55,12 @@ struct Coverage {
     double cObs = 0, cAll = 0;
 };
 
+/// A vertex at this distance [m] or nearer covers at delta: a float's rounding must not lose one
+/// that lies exactly there.
+inline float coverageLimit(double delta) {
+    return static_cast<float>(delta * (1 + 1e-6));
+}
+
 /// Judges maps of one world as seen from one view space. The observable set is computed once, at
 /// construction, or read from the cache. Reading is thread-safe; the results are the same bytes
 /// for any number of threads.
@@ -72,7 +78,8 @@ class CoverageJudge {
     double headline() const { return headline_; }                  ///< [m]
     double meshArea() const { return meshArea_; }                  ///< [m^2]
 
-    /// Plain coverage at every delta: 0.1 s for a million vertices on two threads.
+    /// Plain coverage at every delta: 0.1 s for a million vertices on two threads. A map that grows
+    /// view by view is what CoverageTracker is for.
     std::vector<Coverage> coverage(std::span<const Eigen::Vector3f> vertices) const;
 
     /// Everything. `normals`: of the vertices, or empty. `rifts`: places on the rims that the

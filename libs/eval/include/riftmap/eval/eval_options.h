@@ -31,6 +31,9 @@ struct EvalOptions {
     std::string cache;  ///< directory for observable sets; empty = none (programs: a temporary one)
     bool strict = true;  ///< strict coverage too (needs normals)
     void describe(OptionTable& table);
+    /// For programs: an empty `cache` becomes a directory of this user's among the temporary files,
+    /// "none" becomes empty.
+    void resolveCache();
 };
 
 }  // namespace riftmap
