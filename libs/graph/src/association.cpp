@@ -2,7 +2,6 @@
 #include "association.h"
 
 #include <algorithm>
-#include <atomic>
 #include <bit>
 #include <cmath>
 
@@ -13,7 +12,6 @@ namespace {
 
 constexpr float kNearest = 0.01F;  // [m] a vertex nearer than this to the camera is not in view
 constexpr float kBorder = 2.0F;    // [px] vertices this far outside still meet border pixels
-constexpr std::uint64_t kNoBest = 0xFFFFFFFFFFFFFFFFULL;
 
 /// The image's pyramid, widened by kBorder; a box outside of one of its planes is not in view.
 class Frustum {
@@ -55,31 +53,31 @@ class Frustum {
     Eigen::Vector3f translation_;
 };
 
-template <class T>
-std::atomic_ref<T> atomic(T& value) {
-    return std::atomic_ref<T>(value);
-}
-
 }  // namespace
 
 void Association::computeReach(const ViewPoints& view, const GraphOptions& options) {
     tileColumns_ = (view.width + kTile - 1) / kTile;
     tileRows_ = (view.height + kTile - 1) / kTile;
-    std::vector<float> own(static_cast<std::size_t>(tileColumns_) *
-                           static_cast<std::size_t>(tileRows_));
     const auto tile = [this](int c, int r) {
         return static_cast<std::size_t>(r) * static_cast<std::size_t>(tileColumns_) +
                static_cast<std::size_t>(c);
     };
-    parallelFor(static_cast<std::size_t>(tileRows_), 1, [&](std::size_t first, std::size_t) {
-        const int tr = static_cast<int>(first);
-        for (int r = tr * kTile; r < std::min(view.height, (tr + 1) * kTile); ++r) {
-            for (int c = 0; c < view.width; ++c) {
-                const std::size_t i = view.index(c, r);
-                if (view.z[i] > 0) {
-                    float& most = own[tile(c / kTile, tr)];
-                    most = std::max(most, view.z[i] + gate(view, i, options).depth);
-                }
+    auto& own = ownReach_;
+    own.resize(static_cast<std::size_t>(tileColumns_) * static_cast<std::size_t>(tileRows_));
+    const bool paper = options.fusion == GraphOptions::Fusion::kFirst;
+    parallelFor(static_cast<std::size_t>(tileRows_), 2, [&](std::size_t begin, std::size_t end) {
+        std::vector<float> most(static_cast<std::size_t>(tileColumns_ * kTile));
+        for (int tr = static_cast<int>(begin); tr < static_cast<int>(end); ++tr) {
+            std::fill(most.begin(), most.end(), 0.0F);
+            for (int r = tr * kTile; r < std::min(view.height, (tr + 1) * kTile); ++r) {
+                const std::size_t i = view.index(0, r);
+                reachOfRow({&view.z[i], &view.sigma[i], &view.stretch[i], view.width,
+                            static_cast<float>(options.gamma), view.footprint, paper},
+                           most.data());
+            }
+            for (int tc = 0; tc < tileColumns_; ++tc) {
+                const auto first = most.begin() + static_cast<std::ptrdiff_t>(tc) * kTile;
+                own[tile(tc, tr)] = *std::max_element(first, first + kTile);
             }
         }
     });
@@ -115,99 +113,120 @@ void Association::cull(const GraphStorage& storage, const ViewPoints& view) {
     std::sort(pages.begin(), pages.end());
 }
 
-void Association::projectPage(const GraphStorage& storage, const ViewPoints& view,
-                              std::uint32_t which) {
-    const Page& page = storage.page(pages[which]);
-    const Eigen::Matrix3f& r = view.rotation;  // its columns are the camera's axes
-    const float right = static_cast<float>(view.width) - 0.5F;
-    const float bottom = static_cast<float>(view.height) - 0.5F;
-    for (std::uint32_t slot = 0; slot < Page::kSize; ++slot) {
-        const std::uint32_t k = which * Page::kSize + slot;
-        Candidate& candidate = candidates[k];
-        candidate.z = 0;
-        pixelOf_[k] = kNone;
-        best[k] = kNoBest;
-        flags[k] = 0;
-        areaOf[k] = 0;
-        if (!page.living(slot)) {
-            continue;
-        }
-        const float dx = page.x[slot] - view.translation.x();
-        const float dy = page.y[slot] - view.translation.y();
-        const float dz = page.z[slot] - view.translation.z();
-        const float z = r(0, 2) * dx + r(1, 2) * dy + r(2, 2) * dz;
-        if (z < kNearest) {
-            continue;
-        }
-        const float u = view.fx * (r(0, 0) * dx + r(1, 0) * dy + r(2, 0) * dz) / z + view.cx;
-        const float v = view.fy * (r(0, 1) * dx + r(1, 1) * dy + r(2, 1) * dz) / z + view.cy;
-        if (!(u >= -0.5F - kBorder && u < right + kBorder && v >= -0.5F - kBorder &&
-              v < bottom + kBorder)) {
-            continue;
-        }
-        const int column = std::clamp(compact::roundNearest(u), 0, view.width - 1);
-        const int row = std::clamp(compact::roundNearest(v), 0, view.height - 1);
-        const std::size_t tile =
-            static_cast<std::size_t>(row / kTile) * static_cast<std::size_t>(tileColumns_) +
-            static_cast<std::size_t>(column / kTile);
-        const float sigma = compact::Sigma::decode(page.sigma[slot]);
-        if (z > reach_[tile] + kNoiseGate * sigma) {
-            continue;  // hidden behind everything the view shows there
-        }
-        candidate = {u, v, z, sigma};
-        const std::size_t pixel = view.index(column, row);
-        pixelOf_[k] = static_cast<std::uint32_t>(pixel);
-        atomic(start_[pixel]).fetch_add(1, std::memory_order_relaxed);
+void Association::projectPages(const GraphStorage& storage, const ViewPoints& view) {
+    const std::size_t n = candidateCount();
+    for (auto* values : {&u_, &v_, &z_, &sigma_}) {
+        values->resize(n);
     }
+    pixelOf_.resize(n);
+    claims.resize(n);
+    inView_.resize(pages.size());
+    rowsOf_.resize(pages.size());
+    Projection in;
+    std::copy_n(view.rotation.data(), 9, in.rotation.begin());
+    std::copy_n(view.translation.data(), 3, in.translation.begin());
+    in.fx = view.fx;
+    in.fy = view.fy;
+    in.cx = view.cx;
+    in.cy = view.cy;
+    in.width = view.width;
+    in.height = view.height;
+    in.nearest = kNearest;
+    in.border = kBorder;
+    in.reach = reach_.data();
+    static_assert(kTile == 8, "as the kernel has it");
+    in.tileColumns = tileColumns_;
+    in.noiseGate = kNoiseGate;
+    parallelFor(pages.size(), 32, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i != end; ++i) {
+            const std::size_t k = i * Page::kSize;
+            ProjectedPage out{&u_[k], &v_[k], &z_[k], &sigma_[k], &pixelOf_[k]};
+            projectPage(storage.page(pages[i]), in, out);
+            inView_[i] = out.inView;
+            rowsOf_[i] = {out.firstRow, out.lastRow};
+            std::fill_n(&claims[k], Page::kSize, Claims{});
+        }
+    });
 }
 
 void Association::project(const GraphStorage& storage, const ViewPoints& view,
                           const GraphOptions& options) {
     computeReach(view, options);
     cull(storage, view);
-    const std::size_t n = candidateCount();
-    candidates.resize(n);
-    best.resize(n);
-    flags.resize(n);
-    areaOf.resize(n);
-    pixelOf_.resize(n);
-    start_.assign(view.z.size() + 1, 0);
-    parallelFor(pages.size(), 16, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i != end; ++i) {
-            projectPage(storage, view, static_cast<std::uint32_t>(i));
-        }
-    });
-    sortByPixel();
+    projectPages(storage, view);
+    sortByPixel(view);
 }
 
-void Association::sortByPixel() {
-    // start_ holds counts now. Each pixel's end first; placing its entries moves it to their start.
-    std::uint32_t sum = 0;
-    for (std::uint32_t& start : start_) {
-        sum += start;
-        start = sum;
+/// f(candidate) for those in view whose pixel lies in these rows.
+template <class F>
+void Association::forEachCandidateOn(int firstRow, int endRow, int width, F&& f) const {
+    const auto first = static_cast<std::uint32_t>(firstRow * width);
+    const auto count = static_cast<std::uint32_t>((endRow - firstRow) * width);
+    for (std::size_t i = 0; i < pages.size(); ++i) {
+        if (rowsOf_[i].first >= endRow || rowsOf_[i].second < firstRow) {
+            continue;
+        }
+        forEachBit(inView_[i], [&](std::uint32_t slot) {
+            const std::size_t k = i * Page::kSize + slot;
+            if (pixelOf_[k] - first < count) {
+                f(k);
+            }
+        });
+    }
+}
+
+void Association::countEntries(const ViewPoints& view, int strip) {
+    const int first = strip * kStripRows, end = std::min(view.height, first + kStripRows);
+    const auto w = static_cast<std::uint32_t>(view.width);
+    std::fill(start_.begin() + static_cast<std::ptrdiff_t>(first) * (view.width + 1),
+              start_.begin() + static_cast<std::ptrdiff_t>(end) * (view.width + 1), 0U);
+    std::size_t n = 0;
+    forEachCandidateOn(first, end, view.width, [&](std::size_t k) {
+        ++start_[pixelOf_[k] + pixelOf_[k] / w];
+        ++n;
+    });
+    strips_[static_cast<std::size_t>(strip)].entries = n;
+}
+
+void Association::placeEntries(const ViewPoints& view, int strip, std::size_t before) {
+    const int first = strip * kStripRows, end = std::min(view.height, first + kStripRows);
+    const auto w = static_cast<std::uint32_t>(view.width);
+    // Counts become ends; placing moves each pixel's end to its start.
+    auto sum = static_cast<std::uint32_t>(before);
+    for (std::size_t i = static_cast<std::size_t>(first) * (w + 1);
+         i < static_cast<std::size_t>(end) * (w + 1); ++i) {
+        sum += start_[i];
+        start_[i] = sum;
+    }
+    forEachCandidateOn(first, end, view.width, [&](std::size_t k) {
+        const std::uint32_t at = --start_[pixelOf_[k] + pixelOf_[k] / w];
+        const float noise = kNoiseGate * sigma_[k];
+        entryU_[at] = u_[k];
+        entryV_[at] = v_[k];
+        entryZ_[at] = z_[k];
+        entryNoise_[at] = noise * noise;
+        entryCandidate_[at] = static_cast<std::int32_t>(k);
+    });
+}
+
+void Association::sortByPixel(const ViewPoints& view) {
+    start_.resize(static_cast<std::size_t>(view.height) *
+                  (static_cast<std::size_t>(view.width) + 1));
+    strips_.resize(static_cast<std::size_t>((view.height + kStripRows - 1) / kStripRows));
+    parallelFor(strips_.size(), 1, [&](std::size_t strip, std::size_t) {
+        countEntries(view, static_cast<int>(strip));
+    });
+    std::vector<std::size_t> before(strips_.size() + 1, 0);
+    for (std::size_t s = 0; s < strips_.size(); ++s) {
+        before[s + 1] = before[s] + strips_[s].entries;
     }
     constexpr std::size_t kPadding = 64;  // the kernel reads whole vectors
     for (auto* values : {&entryU_, &entryV_, &entryZ_, &entryNoise_}) {
-        values->resize(sum + kPadding);
+        values->resize(before.back() + kPadding);
     }
-    entryCandidate_.resize(sum + kPadding);
-    // The order within a pixel depends on the threads; matching does not depend on that order.
-    parallelFor(pixelOf_.size(), 4096, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t k = begin; k != end; ++k) {
-            if (pixelOf_[k] == kNone) {
-                continue;
-            }
-            const std::uint32_t at =
-                atomic(start_[pixelOf_[k]]).fetch_sub(1, std::memory_order_relaxed) - 1;
-            const Candidate& o = candidates[k];
-            const float noise = kNoiseGate * o.sigma;
-            entryU_[at] = o.u;
-            entryV_[at] = o.v;
-            entryZ_[at] = o.z;
-            entryNoise_[at] = noise * noise;
-            entryCandidate_[at] = static_cast<std::int32_t>(k);
-        }
+    entryCandidate_.resize(before.back() + kPadding);
+    parallelFor(strips_.size(), 1, [&](std::size_t strip, std::size_t) {
+        placeEntries(view, static_cast<int>(strip), before[strip]);
     });
 }
 
@@ -226,8 +245,8 @@ void Association::matchByDistance(const ViewPoints& view, float gamma, int row, 
         const int last = std::min(view.width - 1, column + radius);
         float least = gamma * gamma;
         for (int r = std::max(0, row - radius); r <= std::min(view.height - 1, row + radius); ++r) {
-            const std::uint32_t end = start_[view.index(last, r) + 1];
-            for (std::uint32_t e = start_[view.index(first, r)]; e < end; ++e) {
+            const std::uint32_t* start = &start_[view.index(0, r) + static_cast<std::size_t>(r)];
+            for (std::uint32_t e = start[first]; e < start[last + 1]; ++e) {
                 const float z = entryZ_[e];
                 const Eigen::Vector3f other((entryU_[e] - view.cx) * z / view.fx,
                                             (entryV_[e] - view.cy) * z / view.fy, z);
@@ -243,59 +262,75 @@ void Association::matchByDistance(const ViewPoints& view, float gamma, int row, 
     }
 }
 
-void Association::claim(const ViewPoints& view, float targetResolution, std::size_t pixel,
-                        std::uint32_t candidate, float distance) {
+void Association::claim(const ViewPoints& view, float targetResolution, const Strip::Claim& claim) {
+    const std::uint32_t pixel = claim.pixel;
+    Claims& all = claims[claim.candidate];
     // Positive floats order as their bits do.
-    const std::uint64_t key = (std::uint64_t{std::bit_cast<std::uint32_t>(distance)} << 32U) |
-                              static_cast<std::uint32_t>(pixel);
-    auto slot = atomic(best[candidate]);
-    std::uint64_t old = slot.load(std::memory_order_relaxed);
-    while (key < old && !slot.compare_exchange_weak(old, key, std::memory_order_relaxed)) {
-    }
+    all.best = std::min(
+        all.best, (std::uint64_t{std::bit_cast<std::uint32_t>(claim.distance)} << 32U) | pixel);
     const bool fine = view.spacing(pixel) <= targetResolution;
-    const auto flag = static_cast<std::uint8_t>(
-        (view.kinds[pixel] == 0 ? kSomeSurrounded : kSomeOpen) | (fine ? kSomeFine : 0));
-    auto flagSlot = atomic(flags[candidate]);
-    if ((flagSlot.load(std::memory_order_relaxed) & flag) != flag) {
-        flagSlot.fetch_or(flag, std::memory_order_relaxed);
+    all.flags |= view.kinds[pixel] == 0 ? kSomeSurrounded : kSomeOpen;
+    all.flags |= fine ? unsigned{kSomeFine} : 0U;
+    all.area += static_cast<std::uint32_t>(view.area[pixel] / kAreaUnit);
+}
+
+void Association::matchStrip(const ViewPoints& view, const GraphOptions& options, int index) {
+    Strip& strip = strips_[static_cast<std::size_t>(index)];
+    strip.distance.resize(static_cast<std::size_t>(view.width));
+    strip.found.resize(static_cast<std::size_t>(view.width));
+    strip.foreign.clear();
+    strip.matched = 0;
+    const auto gamma = static_cast<float>(options.gamma);
+    const auto target = static_cast<float>(options.targetResolution);
+    const int first = index * kStripRows, end = std::min(view.height, first + kStripRows);
+    const auto own = static_cast<std::uint32_t>(first * view.width);
+    const auto ownCount = static_cast<std::uint32_t>((end - first) * view.width);
+    for (int r = first; r < end; ++r) {
+        const std::size_t line = view.index(0, r);
+        if (options.fusion == GraphOptions::Fusion::kFirst) {
+            matchByDistance(view, gamma, r, strip.distance.data(), strip.found.data());
+        } else {
+            matchRow({entryU_.data(), entryV_.data(), entryZ_.data(), entryNoise_.data(),
+                      entryCandidate_.data(), start_.data(), view.width, view.height, r,
+                      view.footprint, gamma, &view.z[line], &view.sigma[line], &view.stretch[line],
+                      strip.distance.data(), strip.found.data()});
+        }
+        for (std::size_t c = 0; c < strip.found.size(); ++c) {
+            matchOf[line + c] = static_cast<std::uint32_t>(strip.found[c]);
+            if (strip.found[c] >= 0) {
+                const Strip::Claim claimed{matchOf[line + c], static_cast<std::uint32_t>(line + c),
+                                           strip.distance[c]};
+                if (pixelOf_[claimed.candidate] - own < ownCount) {
+                    claim(view, target, claimed);
+                } else {
+                    strip.foreign.push_back(claimed);
+                }
+                ++strip.matched;
+            }
+        }
     }
-    atomic(areaOf[candidate])
-        .fetch_add(static_cast<std::uint32_t>(view.area[pixel] / kAreaUnit),
-                   std::memory_order_relaxed);
 }
 
 void Association::match(const ViewPoints& view, const GraphOptions& options) {
+    static_assert(static_cast<std::uint32_t>(-1) == kNone);
     matchOf.resize(view.z.size());
-    std::atomic<std::size_t> count{0};
-    const auto gamma = static_cast<float>(options.gamma);
-    const auto target = static_cast<float>(options.targetResolution);
-    const auto matchRows = [&](std::size_t begin, std::size_t end) {
-        std::vector<float> distance(static_cast<std::size_t>(view.width));
-        std::vector<std::int32_t> found(static_cast<std::size_t>(view.width));
-        std::size_t mine = 0;
-        for (int r = static_cast<int>(begin); r < static_cast<int>(end); ++r) {
-            const std::size_t line = view.index(0, r);
-            if (options.fusion == GraphOptions::Fusion::kFirst) {
-                matchByDistance(view, gamma, r, distance.data(), found.data());
-            } else {
-                matchRow({entryU_.data(), entryV_.data(), entryZ_.data(), entryNoise_.data(),
-                          entryCandidate_.data(), start_.data(), view.width, view.height, r,
-                          view.footprint, gamma, &view.z[line], &view.sigma[line],
-                          &view.stretch[line], distance.data(), found.data()});
-            }
-            for (std::size_t c = 0; c < found.size(); ++c) {
-                matchOf[line + c] = kNone;
-                if (found[c] >= 0) {
-                    matchOf[line + c] = static_cast<std::uint32_t>(found[c]);
-                    claim(view, target, line + c, matchOf[line + c], distance[c]);
-                    ++mine;
-                }
-            }
+    parallelFor(strips_.size(), 1, [&](std::size_t strip, std::size_t) {
+        matchStrip(view, options, static_cast<int>(strip));
+    });
+    matched = 0;
+    for (const Strip& strip : strips_) {
+        matched += strip.matched;
+        for (const Strip::Claim& claimed : strip.foreign) {
+            claim(view, static_cast<float>(options.targetResolution), claimed);
         }
-        count.fetch_add(mine, std::memory_order_relaxed);
-    };
-    parallelFor(static_cast<std::size_t>(view.height), 8, matchRows);
-    matched = count.load();
+    }
+}
+
+std::size_t Association::memoryBytes() const {
+    return u_.capacity() * (4 * sizeof(float) + sizeof(pixelOf_[0])) +
+           claims.capacity() * sizeof(Claims) +
+           entryU_.capacity() * (4 * sizeof(float) + sizeof(entryCandidate_[0])) +
+           (start_.capacity() + matchOf.capacity()) * sizeof(std::uint32_t);
 }
 
 }  // namespace riftmap

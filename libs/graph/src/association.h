@@ -4,9 +4,11 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "match_kernel.h"
+#include "project_kernel.h"
 #include "riftmap/graph/graph_storage.h"
 #include "riftmap/graph/pixel_graph.h"
 #include "view_points.h"
@@ -37,22 +39,35 @@ class Association {
     /// Each pixel takes the nearest candidate within its gate.
     void match(const ViewPoints& view, const GraphOptions& options);
 
+    /// What the pixels that matched a candidate say together.
+    struct Claims {
+        std::uint64_t best = kNoBest;  ///< least of: distance bits << 32 | pixel
+        std::uint32_t area = 0;        ///< surface of its pixels [kAreaUnit]
+        std::uint32_t flags = 0;       ///< Flag
+    };
+
     std::size_t candidateCount() const { return pages.size() * Page::kSize; }
     VertexId idOf(std::uint32_t candidate) const {
         return GraphStorage::idOf(pages[candidate / Page::kSize], candidate % Page::kSize);
     }
+    Candidate candidate(std::uint32_t k) const { return {u_[k], v_[k], z_[k], sigma_[k]}; }
+    bool inView(std::uint32_t k) const {
+        return ((inView_[k / Page::kSize] >> (k % Page::kSize)) & 1U) != 0;
+    }
+    /// Slots of pages[which] in view.
+    std::uint64_t slotsInView(std::uint32_t which) const { return inView_[which]; }
+    /// Of the slots of pages[which] before the view [m].
+    const float* sigmas(std::uint32_t which) const { return &sigma_[which * Page::kSize]; }
     /// The pixel that fits a candidate best, kNone where no pixel matched it.
     std::uint32_t bestPixel(std::uint32_t candidate) const {
-        return static_cast<std::uint32_t>(best[candidate]);
+        return static_cast<std::uint32_t>(claims[candidate].best);
     }
+    std::size_t memoryBytes() const;
 
-    std::vector<std::uint32_t> pages;          ///< pages in view, ascending
-    std::vector<Candidate> candidates;         ///< 64 a page of `pages`
-    std::vector<std::uint32_t> matchOf;        ///< pixel -> candidate or kNone
-    std::vector<std::uint64_t> best;           ///< candidate -> distance bits << 32 | pixel
-    std::vector<std::uint8_t> flags;           ///< candidate -> Flag
-    std::vector<std::uint32_t> areaOf;         ///< candidate -> surface of its pixels [kAreaUnit]
-    std::size_t matched = 0;                   ///< pixels with a match
+    std::vector<std::uint32_t> pages;    ///< pages in view, ascending; 64 candidates each
+    std::vector<std::uint32_t> matchOf;  ///< pixel -> candidate or kNone
+    std::vector<Claims> claims;          ///< of a candidate
+    std::size_t matched = 0;             ///< pixels with a match
     static constexpr float kAreaUnit = 1e-9F;  ///< [m^2]
 
     /// The gate of a pixel. The paper's is plain gamma.
@@ -65,26 +80,53 @@ class Association {
     }
 
  private:
+    static constexpr std::uint64_t kNoBest = 0xFFFFFFFFFFFFFFFFULL;
+    static constexpr int kTile = 8;
+    static constexpr int kStripRows = 16;
+
+    /// Rows of the image that one task works on, so that nobody else writes to their pixels or to
+    /// the candidates that lie on them.
+    struct Strip {
+        struct Claim {
+            std::uint32_t candidate, pixel;
+            float distance;
+        };
+        std::size_t entries = 0, matched = 0;
+        std::vector<Claim> foreign;   ///< of candidates on other strips
+        std::vector<float> distance;  ///< of a row
+        std::vector<std::int32_t> found;
+    };
+
     void cull(const GraphStorage& storage, const ViewPoints& view);
     void computeReach(const ViewPoints& view, const GraphOptions& options);
-    void projectPage(const GraphStorage& storage, const ViewPoints& view, std::uint32_t which);
+    void projectPages(const GraphStorage& storage, const ViewPoints& view);
+    void sortByPixel(const ViewPoints& view);
+    void countEntries(const ViewPoints& view, int strip);
+    void placeEntries(const ViewPoints& view, int strip, std::size_t before);
+    template <class F>
+    void forEachCandidateOn(int firstRow, int endRow, int width, F&& f) const;
+    void matchStrip(const ViewPoints& view, const GraphOptions& options, int index);
     void matchByDistance(const ViewPoints& view, float gamma, int row, float* distance,
                          std::int32_t* found) const;
-    void claim(const ViewPoints& view, float targetResolution, std::size_t pixel,
-               std::uint32_t candidate, float distance);
+    void claim(const ViewPoints& view, float targetResolution, const Strip::Claim& claim);
 
-    static constexpr int kTile = 8;
     int tileColumns_ = 0, tileRows_ = 0;
-    std::vector<float> reach_;  ///< tile -> depth beyond which nothing can match there
+    std::vector<float> ownReach_, reach_;  ///< tile -> depth beyond which nothing can match there
     float farthest_ = 0;
-    void sortByPixel();
+    std::vector<Strip> strips_;
+
+    // Of a candidate.
+    std::vector<float> u_, v_, z_, sigma_;
+    std::vector<std::uint32_t> pixelOf_;  ///< only where in view
+    // Of a page of candidates.
+    std::vector<std::uint64_t> inView_;
+    std::vector<std::pair<int, int>> rowsOf_;  ///< first and last row of its pixels
 
     // What matching needs of a candidate, in the order of pixels: neighbours in a row of the image
     // are neighbours in memory.
     std::vector<float> entryU_, entryV_, entryZ_, entryNoise_;  ///< noise: (kNoiseGate sigma)^2
     std::vector<std::int32_t> entryCandidate_;
-    std::vector<std::uint32_t> start_;    ///< pixel -> its first entry; one more at the end
-    std::vector<std::uint32_t> pixelOf_;  ///< candidate -> pixel or kNone
+    std::vector<std::uint32_t> start_;  ///< MatchRow::start
 };
 
 }  // namespace riftmap

@@ -54,6 +54,16 @@ std::array<std::int32_t, 3> GraphStorage::keyOf(const Eigen::Vector3f& p) const 
     return {cell(p.x()), cell(p.y()), cell(p.z())};
 }
 
+GraphStorage::Cube GraphStorage::cubeOf(const Eigen::Vector3f& p) const {
+    Cube cube;
+    cube.key = keyOf(p);
+    const Eigen::Vector3d key(cube.key[0], cube.key[1], cube.key[2]);
+    const Eigen::Vector3d rounding = 1e-12 * (key.cwiseAbs().array() + 1.0) * blockSize_;
+    cube.low = key * blockSize_ + rounding;
+    cube.high = (key.array() + 1.0).matrix() * blockSize_ - rounding;
+    return cube;
+}
+
 std::uint32_t GraphStorage::findBlock(const std::array<std::int32_t, 3>& key) const {
     const auto it = blockOfKey_.find(key);
     return it == blockOfKey_.end() ? kNoBlock : it->second;
@@ -97,31 +107,38 @@ std::uint32_t GraphStorage::newPage(std::uint32_t block) {
     return index;
 }
 
-VertexId GraphStorage::addVertex(std::uint32_t block) {
-    Block& b = blocks_[block];
-    std::uint32_t index = kNoBlock;
-    if (b.vertices < b.pages.size() * Page::kSize) {
-        // The youngest page is the likeliest to have room.
-        for (auto it = b.pages.rbegin(); index == kNoBlock && it != b.pages.rend(); ++it) {
-            if (~page(*it).alive != 0) {
-                index = *it;
+void GraphStorage::addVertices(std::uint32_t block, std::uint32_t count,
+                               std::vector<VertexId>& ids) {
+    vertexCount_ += count;
+    while (count > 0) {
+        Block& b = blocks_[block];
+        std::uint32_t index = kNoBlock;
+        if (b.vertices < b.pages.size() * Page::kSize) {
+            // The youngest page is the likeliest to have room.
+            for (auto it = b.pages.rbegin(); index == kNoBlock && it != b.pages.rend(); ++it) {
+                if (~page(*it).alive != 0) {
+                    index = *it;
+                }
             }
         }
+        if (index == kNoBlock) {
+            index = newPage(block);
+        }
+        Page& p = page(index);
+        for (; count > 0 && ~p.alive != 0; --count) {
+            const auto slot = static_cast<std::uint32_t>(std::countr_one(p.alive));
+            p.alive |= std::uint64_t{1} << slot;
+            ++blocks_[block].vertices;
+            ids.push_back(idOf(index, slot));
+        }
     }
-    if (index == kNoBlock) {
-        index = newPage(block);
-    }
-    Page& p = page(index);
-    const auto slot = static_cast<std::uint32_t>(std::countr_one(p.alive));
-    p.alive |= std::uint64_t{1} << slot;
-    p.normal[slot] = 0;
-    p.open[slot] = 0;
-    p.state[slot] = 0;
-    p.neighbour[slot].fill(kNoVertex);
-    p.weight[slot].fill(0);
-    ++blocks_[block].vertices;
-    ++vertexCount_;
-    return idOf(index, slot);
+}
+
+VertexId GraphStorage::addVertex(std::uint32_t block) {
+    std::vector<VertexId> ids;
+    addVertices(block, 1, ids);
+    page(pageOf(ids.front())).clearSlot(slotOf(ids.front()));
+    return ids.front();
 }
 
 void GraphStorage::removeVertex(VertexId id) {
@@ -172,25 +189,12 @@ void GraphStorage::updateBlockBounds(std::uint32_t block) {
     }
 }
 
-std::uint16_t* GraphStorage::findHalfEdge(VertexId a, VertexId b) {
-    Page& p = page(pageOf(a));
-    const std::uint32_t slot = slotOf(a);
-    auto& neighbour = p.neighbour[slot];
-    const bool overflow = (p.state[slot] & kOverflow) != 0;
-    const std::uint32_t inlined = Page::kInline - (overflow ? 1 : 0);
-    for (std::uint32_t i = 0; i < inlined; ++i) {
-        if (neighbour[i] == b) {
-            return &p.weight[slot][i];
-        }
-    }
-    if (overflow) {
-        for (std::uint32_t c = neighbour[Page::kInline - 1]; c != EdgeChunk::kNone;
-             c = edgeChunks_[c].next) {
-            EdgeChunk& chunk = edgeChunks_[c];
-            for (std::uint32_t i = 0; i < EdgeChunk::kSize; ++i) {
-                if (chunk.neighbour[i] == b) {
-                    return &chunk.weight[i];
-                }
+std::uint16_t* GraphStorage::findInChunks(std::uint32_t first, VertexId b) {
+    for (std::uint32_t c = first; c != EdgeChunk::kNone; c = edgeChunks_[c].next) {
+        EdgeChunk& chunk = edgeChunks_[c];
+        for (std::uint32_t i = 0; i < EdgeChunk::kSize; ++i) {
+            if (chunk.neighbour[i] == b) {
+                return &chunk.weight[i];
             }
         }
     }

@@ -79,7 +79,8 @@ class Search {
         if (r < 0 || r >= in_.height || first > last) {
             return;
         }
-        const std::size_t line = static_cast<std::size_t>(r) * static_cast<std::size_t>(in_.width);
+        const std::size_t line =
+            static_cast<std::size_t>(r) * static_cast<std::size_t>(in_.width + 1);
         const std::size_t end = in_.start[line + static_cast<std::size_t>(last) + 1];
         for (std::size_t e = in_.start[line + static_cast<std::size_t>(first)]; e < end;
              e += hn::Lanes(d_)) {

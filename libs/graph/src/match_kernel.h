@@ -20,14 +20,16 @@ struct Gate {
     float lateral = 0;  ///< across the ray [m]
     float depth = 0;    ///< along the ray, for an exactly known vertex [m]
 };
+inline constexpr float kBlur = 0.75F;  ///< of the spacing
 inline Gate gateOf(float gamma, float spacing, float sigma, float stretch) {
-    const float blur = 0.75F * spacing;
+    const float blur = kBlur * spacing;
     return {std::max(gamma, blur),
             std::max({gamma, kNoiseGate * sigma, blur * std::max(1.0F, stretch)})};
 }
 
-/// One row of pixels to match. `entry` arrays lie in the order of pixels: those of pixel i are
-/// [start[i], start[i + 1]); they must be readable 64 elements beyond their end.
+/// One row of pixels to match. The arrays of entries lie in the order of pixels: those of column c
+/// in row r are [start[i], start[i + 1]) with i = r (width + 1) + c; they must be readable 64
+/// elements beyond their end.
 struct MatchRow {
     const float *u = nullptr, *v = nullptr, *z = nullptr;  ///< of an entry: [px], [px], [m]
     const float* noise = nullptr;                          ///< (kNoiseGate sigma)^2 [m^2]

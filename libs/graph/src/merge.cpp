@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "fuse_kernel.h"
 #include "normals.h"
 #include "riftmap/core/parallel.h"
 #include "visibility.h"
@@ -13,12 +14,9 @@
 namespace riftmap {
 namespace {
 
-constexpr float kTinySigma = 1e-6F;   // [m]
-constexpr float kLeastSigma = 1e-4F;  // [m] nothing is known better than this by one view
 constexpr float kNoiseFactor = 3.0F;  // standard deviations
-constexpr float kNoisy = 0.25F;       // sigma per spacing above which normals come from patches
 constexpr unsigned kDeletingEvidence = 2;    // views
-constexpr std::uint32_t kWellConnected = 4;  // edges of a pixel
+constexpr std::uint32_t kWellConnected = Page::kInline;  // edges of a pixel
 constexpr std::uint32_t kMostEdges = 9;      // what fits without a second chunk
 constexpr std::uint32_t kPagesAtOnce = 16;
 constexpr int kRowsAtOnce = 8;
@@ -69,8 +67,12 @@ std::uint8_t withEvidence(std::uint8_t state, unsigned evidence) {
                                      (std::min(evidence, 7U) << kEvidenceShift));
 }
 
+std::uint16_t weightAt(std::uint16_t& slot) {
+    return std::atomic_ref<std::uint16_t>(slot).load(std::memory_order_relaxed);
+}
+
 /// Lowers the weight code stored at `slot`; safe while others do the same. True if it changed.
-bool lower(std::uint16_t& slot, std::uint16_t code) {
+bool lowerWeight(std::uint16_t& slot, std::uint16_t code) {
     std::atomic_ref<std::uint16_t> ref(slot);
     std::uint16_t old = ref.load(std::memory_order_relaxed);
     for (;;) {
@@ -126,7 +128,7 @@ void Merger::findSeenThroughEdges(const GraphStorage& storage, std::uint32_t whi
         return points_.rotation.transpose() * (p - points_.translation);
     };
     forEachBit(page.alive, [&](std::uint32_t slot) {
-        if (!page.mayHaveHighEdge(slot) || !(seen_.candidates[which * Page::kSize + slot].z > 0)) {
+        if (!page.mayHaveHighEdge(slot) || !seen_.inView(which * Page::kSize + slot)) {
             return;
         }
         const VertexId id = GraphStorage::idOf(index, slot);
@@ -153,47 +155,16 @@ std::uint8_t Merger::openBits(std::uint8_t kinds, std::uint8_t state, float sigm
     return static_cast<std::uint8_t>(bits);
 }
 
-void Merger::fuse(const View& view, Page& page, std::uint32_t slot, std::uint32_t candidate,
-                  PageWork& work) {
-    const std::uint32_t pixel = seen_.bestPixel(candidate);
-    const auto w = static_cast<std::uint32_t>(points_.width);
-    const int column = static_cast<int>(pixel % w), row = static_cast<int>(pixel / w);
-    float sigma = compact::Sigma::decode(page.sigma[slot]);
-    if (!paper()) {
-        // One observation a view, however many pixels matched: their errors are not independent.
-        const float a = std::max(sigma, kTinySigma),
-                    b = std::max(points_.sigma[pixel], kLeastSigma);
-        const float gain = a * a / (a * a + b * b);
-        const Eigen::Vector3f old = page.position(slot);
-        const Eigen::Vector3f step = gain * (points_.inMap(column, row) - old);
-        page.x[slot] += step.x();
-        page.y[slot] += step.y();
-        page.z[slot] += step.z();
-        sigma = a * b / std::sqrt(a * a + b * b);
-        page.sigma[slot] = compact::Sigma::encode(sigma);
-        const auto colour = colourAt(view.image, pixel, points_.width);
-        for (std::size_t i = 0; i < 3; ++i) {
-            const float before = page.rgb[slot][i];
-            page.rgb[slot][i] = static_cast<std::uint8_t>(
-                compact::roundNearest(before + gain * (static_cast<float>(colour[i]) - before)));
-        }
-        const float spacing = points_.z[pixel] * points_.footprint;
-        if (points_.sigma[pixel] > kNoisy * spacing) {
-            if (points_.onPatch(column, row)) {
-                const Eigen::Vector3f normal =
-                    (1 - gain) * compact::decodeDirection(page.normal[slot]) +
-                    gain * (points_.rotation * points_.patch(column, row).normal);
-                page.normal[slot] = compact::encodeDirection(normal);
-            }
-        } else if (step.norm() > 0.02F * spacing) {
-            work.moved |= std::uint64_t{1} << slot;
-        }
-    }
-    const std::uint8_t flags = seen_.flags[candidate];
+/// What a view says of a matched vertex beside its place: its state, openness and share of the
+/// surface.
+void Merger::update(Page& page, std::uint32_t slot, std::uint32_t candidate, float sigma,
+                    PageWork& work) {
+    const Association::Claims& claims = seen_.claims[candidate];
+    const auto pixel = static_cast<std::uint32_t>(claims.best);
     std::uint8_t& state = page.state[slot];
     state = static_cast<std::uint8_t>(
-        state | ((flags & Association::kSomeSurrounded) != 0 ? kSurrounded : 0) |
-        ((flags & Association::kSomeFine) != 0 ? kFineEnough : 0));
+        state | ((claims.flags & Association::kSomeSurrounded) != 0 ? kSurrounded : 0) |
+        ((claims.flags & Association::kSomeFine) != 0 ? kFineEnough : 0));
     const unsigned evidence = evidenceOf(state);
     state = withEvidence(state, evidence > 0 ? evidence - 1 : 0);
     // Reasons that both views give are better than those of one; else the newer view knows.
@@ -204,9 +175,9 @@ void Merger::fuse(const View& view, Page& page, std::uint32_t slot, std::uint32_
     work.touched = work.touched || open != 0 || page.open[slot] != 0;
     page.open[slot] = open;
     // The pixels of a vertex are its share of the surface, where none of them is cut off.
-    if (frontal(pixel) && (flags & Association::kSomeSurrounded) != 0 &&
-        (flags & Association::kSomeOpen) == 0) {
-        const float area = static_cast<float>(seen_.areaOf[candidate]) * Association::kAreaUnit;
+    if (frontal(pixel) && (claims.flags & Association::kSomeSurrounded) != 0 &&
+        (claims.flags & Association::kSomeOpen) == 0) {
+        const float area = static_cast<float>(claims.area) * Association::kAreaUnit;
         const std::uint16_t code = compact::Area::encode(area);
         work.area += compact::areaUnits(code) - compact::areaUnits(page.area[slot]);
         page.area[slot] = code;
@@ -236,7 +207,7 @@ bool Merger::lookedThrough(const Candidate& candidate) const {
 }
 
 void Merger::passOver(Page& page, std::uint32_t slot, std::uint32_t candidate, PageWork& work) {
-    const Candidate& seen = seen_.candidates[candidate];
+    const Candidate seen = seen_.candidate(candidate);
     if (lookedThrough(seen)) {
         const unsigned evidence = evidenceOf(page.state[slot]) + 1;
         page.state[slot] = withEvidence(page.state[slot], evidence);
@@ -295,32 +266,38 @@ void Merger::fuseAlongRay(Page& page, std::uint32_t slot, const Candidate& seen,
 void Merger::fusePage(const View& view, GraphStorage& storage, std::uint32_t which) {
     Page& page = storage.page(seen_.pages[which]);
     PageWork& work = work_[which];
-    forEachBit(page.alive, [&](std::uint32_t slot) {  // the pixels lie apart in memory
-        const std::uint32_t pixel = seen_.bestPixel(which * Page::kSize + slot);
+    const std::uint32_t first = which * Page::kSize;
+    const std::uint64_t inView = seen_.slotsInView(which);
+    PageFusion fusion;
+    forEachBit(inView, [&](std::uint32_t slot) {
+        const std::uint32_t pixel = seen_.bestPixel(first + slot);
         if (pixel != Association::kNone) {
-            __builtin_prefetch(&points_.z[pixel]);
-            __builtin_prefetch(&points_.sigma[pixel]);
-            __builtin_prefetch(&points_.disparity[pixel]);
-            __builtin_prefetch(&points_.kinds[pixel]);
-            if (!view.image.empty()) {
-                __builtin_prefetch(view.image.data + pixel * view.image.elemSize());
-            }
+            fusion.matched |= std::uint64_t{1} << slot;
+            fusion.pixel[slot] = pixel;
         }
     });
-    forEachBit(page.alive, [&](std::uint32_t slot) {
-        const std::uint32_t candidate = which * Page::kSize + slot;
-        if (!(seen_.candidates[candidate].z > 0)) {
-            return;
-        }
-        if (seen_.bestPixel(candidate) != Association::kNone) {
-            fuse(view, page, slot, candidate, work);
-        } else if (!paper()) {
-            passOver(page, slot, candidate, work);
-        }
-    });
-    if (!paper()) {
-        storage.updatePageBounds(seen_.pages[which]);
+    if (paper()) {  // the first position stays
+        forEachBit(fusion.matched, [&](std::uint32_t slot) {
+            update(page, slot, first + slot, compact::Sigma::decode(page.sigma[slot]), work);
+        });
+        return;
     }
+    fusion.before = seen_.sigmas(which);
+    fuseMatched(points_, page, fusion);
+    work.moved = fusion.moved;
+    forEachBit(fusion.matched, [&](std::uint32_t slot) {
+        const float gain = fusion.gain[slot];
+        const auto colour = colourAt(view.image, fusion.pixel[slot], points_.width);
+        for (std::size_t i = 0; i < 3; ++i) {
+            const float before = page.rgb[slot][i];
+            page.rgb[slot][i] = static_cast<std::uint8_t>(
+                compact::roundNearest(before + gain * (static_cast<float>(colour[i]) - before)));
+        }
+        update(page, slot, first + slot, fusion.sigma[slot], work);
+    });
+    forEachBit(inView & ~fusion.matched,
+               [&](std::uint32_t slot) { passOver(page, slot, first + slot, work); });
+    storage.updatePageBounds(seen_.pages[which]);
 }
 
 void Merger::deleteSeenThrough(GraphStorage& storage, RiftFinder& rifts, MergeResult& result) {
@@ -359,46 +336,67 @@ void Merger::deleteSeenThrough(GraphStorage& storage, RiftFinder& rifts, MergeRe
     }
 }
 
+/// The pixels of a strip that become vertices, by tiles, so that the vertices of a page lie near
+/// each other; and the blocks they lie in.
+void Merger::findFresh(const GraphStorage& storage, int strip) {
+    FreshStrip& fresh = freshStrips_[static_cast<std::size_t>(strip)];
+    fresh.pixels.clear();
+    fresh.runs.clear();
+    const int top = strip * kTile, bottom = std::min(points_.height, top + kTile);
+    for (std::size_t i = points_.index(0, top); i < points_.index(0, bottom); ++i) {
+        const std::uint32_t match = seen_.matchOf[i];
+        vertexOf_[i] = match == Association::kNone ? kNoVertex : seen_.idOf(match);
+        isFresh_[i] = match == Association::kNone && points_.z[i] > 0 ? 1 : 0;
+    }
+    GraphStorage::Cube cube;
+    for (int left = 0; left < points_.width; left += kTile) {
+        const int right = std::min(points_.width, left + kTile);
+        for (int r = top; r < bottom; ++r) {
+            for (int c = left; c < right; ++c) {
+                const std::size_t i = points_.index(c, r);
+                if (isFresh_[i] == 0) {
+                    continue;
+                }
+                const Eigen::Vector3f p = points_.inMap(c, r);
+                if (fresh.runs.empty() || !cube.surelyHolds(p)) {
+                    cube = storage.cubeOf(p);
+                }
+                if (fresh.runs.empty() || fresh.runs.back().first != cube.key) {
+                    fresh.runs.emplace_back(cube.key, 0U);
+                }
+                ++fresh.runs.back().second;
+                fresh.pixels.push_back(static_cast<std::uint32_t>(i));
+            }
+        }
+    }
+}
+
 void Merger::grow(const View& view, GraphStorage& storage, MergeResult& result) {
     const std::size_t n = points_.z.size();
     vertexOf_.resize(n);
-    isFresh_.assign(n, 0);
+    isFresh_.resize(n);
+    freshStrips_.resize(static_cast<std::size_t>((points_.height + kTile - 1) / kTile));
+    forEach(freshStrips_.size(), 2,
+            [&](std::size_t strip) { findFresh(storage, static_cast<int>(strip)); });
     fresh_.clear();
-    forEach(n, 4096, [&](std::size_t i) {
-        vertexOf_[i] =
-            seen_.matchOf[i] == Association::kNone ? kNoVertex : seen_.idOf(seen_.matchOf[i]);
-    });
-    // Ids by tiles, so that the vertices of a page lie near each other.
-    std::array<std::int32_t, 3> lastKey{};
-    std::uint32_t block = GraphStorage::kNoBlock;
-    for (int tr = 0; tr < points_.height; tr += kTile) {
-        for (int tc = 0; tc < points_.width; tc += kTile) {
-            for (int r = tr; r < std::min(points_.height, tr + kTile); ++r) {
-                for (int c = tc; c < std::min(points_.width, tc + kTile); ++c) {
-                    const std::size_t i = points_.index(c, r);
-                    if (!(points_.z[i] > 0) || vertexOf_[i] != kNoVertex) {
-                        continue;
-                    }
-                    const auto key = storage.keyOf(points_.inMap(c, r));
-                    if (block == GraphStorage::kNoBlock || key != lastKey) {
-                        block = storage.blockAt(key);
-                        lastKey = key;
-                        touchedBlocks_.push_back(block);
-                    }
-                    vertexOf_[i] = storage.addVertex(block);
-                    isFresh_[i] = 1;
-                    fresh_.push_back(static_cast<std::uint32_t>(i));
-                }
-            }
+    freshIds_.clear();
+    for (const FreshStrip& strip : freshStrips_) {  // ids one after the other
+        fresh_.insert(fresh_.end(), strip.pixels.begin(), strip.pixels.end());
+        for (const auto& [key, count] : strip.runs) {
+            const std::uint32_t block = storage.blockAt(key);
+            touchedBlocks_.push_back(block);
+            storage.addVertices(block, count, freshIds_);
         }
     }
     forEach(fresh_.size(), 512, [&](std::size_t f) {
         const std::uint32_t pixel = fresh_[f];
         const auto w = static_cast<std::uint32_t>(points_.width);
         const int column = static_cast<int>(pixel % w), row = static_cast<int>(pixel / w);
-        const VertexId id = vertexOf_[pixel];
+        const VertexId id = freshIds_[f];
+        vertexOf_[pixel] = id;
         Page& page = storage.page(GraphStorage::pageOf(id));
         const std::uint32_t slot = GraphStorage::slotOf(id);
+        page.clearSlot(slot);
         const Eigen::Vector3f p = points_.inMap(column, row);
         page.x[slot] = p.x();
         page.y[slot] = p.y();
@@ -444,56 +442,75 @@ void Merger::connectNew(GraphStorage& storage, MergeResult& result) {
     result.newEdges += added.load();
 }
 
-bool Merger::wanted(const GraphStorage& storage, VertexId a, VertexId b, std::uint16_t code) const {
+bool Merger::wanted(const GraphStorage& storage, const NewEdge& e) const {
     if (paper()) {
         return true;
     }
     // Between two vertices that have their four neighbours each, a further low edge says nothing.
-    const std::uint32_t da = storage.degree(a), db = storage.degree(b);
+    const std::uint32_t da = storage.degree(e.a), db = storage.degree(e.b);
     if (da >= kMostEdges || db >= kMostEdges) {
         return false;
     }
-    return (code & compact::kHighBit) != 0 || da < kWellConnected || db < kWellConnected;
+    return (e.code & compact::kHighBit) != 0 || da < kWellConnected || db < kWellConnected;
+}
+
+/// Edges of the view between vertices that are not both new: lowers the weights of those that the
+/// map has, lists those it lacks. What becomes of an edge cannot be foretold, so the edges pass
+/// through lists, each step over all that are left: there are no branches to guess wrong.
+void Merger::compareEdges(GraphStorage& storage, int strip) {
+    EdgeStrip& lists = edgeStrips_[static_cast<std::size_t>(strip)];
+    const int first = strip * kRowsAtOnce, end = std::min(points_.height, first + kRowsAtOnce);
+    const auto w = static_cast<std::size_t>(points_.width);
+    lists.edges.resize(2 * w * static_cast<std::size_t>(kRowsAtOnce));
+    lists.lower.resize(lists.edges.size());
+    NewEdge* out = lists.edges.data();
+    const auto list = [&](std::size_t i, std::size_t j, std::uint16_t code) {
+        const VertexId a = vertexOf_[i], b = vertexOf_[j];
+        *out = {a, b, code};
+        out += (code != ViewPoints::kNoEdge) & (a != b) & ((isFresh_[i] & isFresh_[j]) == 0) ? 1 : 0;
+    };
+    for (int r = first; r < end; ++r) {
+        const std::size_t line = points_.index(0, r);
+        for (std::size_t i = line; i < line + w; ++i) {
+            const std::size_t right = i + 1 < vertexOf_.size() ? i + 1 : i;  // no edge from there
+            const std::size_t below = i + w < vertexOf_.size() ? i + w : i;
+            list(i, right, points_.right[i]);
+            list(i, below, points_.down[i]);
+        }
+    }
+    const std::size_t count = static_cast<std::size_t>(out - lists.edges.data());
+    NewEdge* missing = lists.edges.data();
+    EdgeStrip::Lower* lower = lists.lower.data();
+    for (std::size_t e = 0; e < count; ++e) {
+        const NewEdge edge = lists.edges[e];
+        std::uint16_t* there = storage.findHalfEdge(edge.a, edge.b);
+        const std::uint16_t old = there != nullptr ? weightAt(*there) : edge.code;
+        *lower = {there, edge};
+        lower += compact::smallerWeight(old, edge.code) != old ? 1 : 0;
+        const bool dull = (edge.code & compact::kHighBit) == 0 && storage.fullInline(edge.a) &&
+                          storage.fullInline(edge.b);
+        *missing = edge;
+        missing += (there == nullptr) & (!dull | paper()) ? 1 : 0;
+    }
+    for (const auto* l = lists.lower.data(); l != lower; ++l) {
+        if (lowerWeight(*l->there, l->edge.code)) {
+            lowerWeight(*storage.findHalfEdge(l->edge.b, l->edge.a), l->edge.code);
+        }
+    }
+    lists.edges.resize(static_cast<std::size_t>(missing - lists.edges.data()));
+    std::erase_if(lists.edges, [&](const NewEdge& e) { return !wanted(storage, e); });
 }
 
 void Merger::connectMatched(GraphStorage& storage, MergeResult& result) {
-    const std::size_t strips =
-        (static_cast<std::size_t>(points_.height) + kRowsAtOnce - 1) / kRowsAtOnce;
-    wantedEdges_.resize(strips);
-    forEach(strips, 1, [&](std::size_t strip) {
-        auto& list = wantedEdges_[strip];
-        list.clear();
-        const auto connect = [&](std::size_t i, std::size_t j, std::uint16_t code) {
-            if (code == ViewPoints::kNoEdge || (isFresh_[i] != 0 && isFresh_[j] != 0)) {
-                return;
-            }
-            const VertexId a = vertexOf_[i], b = vertexOf_[j];
-            if (a == b) {
-                return;
-            }
-            if (std::uint16_t* there = storage.findHalfEdge(a, b)) {
-                if (lower(*there, code)) {
-                    lower(*storage.findHalfEdge(b, a), code);
-                }
-            } else if (wanted(storage, a, b, code)) {
-                list.push_back({a, b, code});
-            }
-        };
-        const int first = static_cast<int>(strip) * kRowsAtOnce;
-        for (int r = first; r < std::min(points_.height, first + kRowsAtOnce); ++r) {
-            for (int c = 0; c < points_.width; ++c) {
-                const std::size_t i = points_.index(c, r);
-                connect(i, i + 1, points_.right[i]);
-                connect(i, i + static_cast<std::size_t>(points_.width), points_.down[i]);
-            }
-        }
-    });
-    for (const auto& list : wantedEdges_) {
-        for (const NewEdge& e : list) {
+    edgeStrips_.resize((static_cast<std::size_t>(points_.height) + kRowsAtOnce - 1) / kRowsAtOnce);
+    forEach(edgeStrips_.size(), 1,
+            [&](std::size_t strip) { compareEdges(storage, static_cast<int>(strip)); });
+    for (const EdgeStrip& strip : edgeStrips_) {
+        for (const NewEdge& e : strip.edges) {
             if (std::uint16_t* there = storage.findHalfEdge(e.a, e.b)) {
-                lower(*there, e.code);
-                lower(*storage.findHalfEdge(e.b, e.a), e.code);
-            } else if (wanted(storage, e.a, e.b, e.code)) {
+                lowerWeight(*there, e.code);
+                lowerWeight(*storage.findHalfEdge(e.b, e.a), e.code);
+            } else if (wanted(storage, e)) {
                 storage.addEdge(e.a, e.b, e.code);
                 ++result.newEdges;
             }
@@ -526,8 +543,8 @@ void Merger::refreshNormals(GraphStorage& storage) {
     });
     if (paper()) {  // positions stay, but neighbours were added
         std::vector<VertexId> ends;
-        for (const auto& list : wantedEdges_) {
-            for (const NewEdge& e : list) {
+        for (const EdgeStrip& strip : edgeStrips_) {
+            for (const NewEdge& e : strip.edges) {
                 ends.push_back(e.a);
                 ends.push_back(e.b);
             }
@@ -542,18 +559,28 @@ void Merger::finish(GraphStorage& storage, RiftFinder& rifts, std::int64_t& area
     for (const PageWork& work : work_) {
         area += work.area;
     }
+    area += parallelReduce(
+        freshIds_.size(), 4096, std::int64_t{0},
+        [&](std::size_t begin, std::size_t end) {
+            std::int64_t sum = 0;
+            for (std::size_t f = begin; f != end; ++f) {
+                const VertexId id = freshIds_[f];
+                sum += compact::areaUnits(
+                    storage.page(GraphStorage::pageOf(id)).area[GraphStorage::slotOf(id)]);
+            }
+            return sum;
+        },
+        [](std::int64_t a, std::int64_t b) { return a + b; });
     freshPages_.clear();
-    for (const std::uint32_t pixel : fresh_) {
-        const std::uint32_t index = GraphStorage::pageOf(vertexOf_[pixel]);
-        const Page& page = storage.page(index);
-        area += compact::areaUnits(page.area[GraphStorage::slotOf(vertexOf_[pixel])]);
+    for (const VertexId id : freshIds_) {
+        const std::uint32_t index = GraphStorage::pageOf(id);
         if (freshPages_.empty() || freshPages_.back() != index) {
             freshPages_.push_back(index);
-            rifts.touch(page.block);
+            rifts.touch(storage.page(index).block);
         }
     }
-    for (const auto& list : wantedEdges_) {
-        for (const NewEdge& e : list) {
+    for (const EdgeStrip& strip : edgeStrips_) {
+        for (const NewEdge& e : strip.edges) {
             rifts.touch(storage.page(GraphStorage::pageOf(e.a)).block);
             rifts.touch(storage.page(GraphStorage::pageOf(e.b)).block);
         }
@@ -572,10 +599,9 @@ void Merger::finish(GraphStorage& storage, RiftFinder& rifts, std::int64_t& area
 
 std::size_t Merger::memoryBytes() const {
     const std::size_t pixels = points_.z.capacity();
-    const std::size_t candidates = seen_.candidates.capacity();
     return pixels * (3 * sizeof(float) + 2 * sizeof(std::uint16_t) + 2 + 5 * sizeof(VertexId)) +
            points_.patches.capacity() * sizeof(PatchPlane) +
-           candidates * (sizeof(Candidate) + sizeof(std::uint64_t) + 1 + 2 * sizeof(VertexId)) +
+           seen_.memoryBytes() +
            work_.capacity() * sizeof(PageWork);
 }
 

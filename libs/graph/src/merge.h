@@ -2,7 +2,9 @@
 // Algorithm 2 and section VII of the paper: a view becomes part of the map.
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "association.h"
@@ -38,19 +40,36 @@ class Merger {
         std::uint16_t code;
     };
 
+    /// What a strip of rows contributes to the growth of the map.
+    struct FreshStrip {
+        std::vector<std::uint32_t> pixels;  ///< that become vertices
+        /// The blocks of these pixels: key, how many in a row.
+        std::vector<std::pair<std::array<std::int32_t, 3>, std::uint32_t>> runs;
+    };
+    struct EdgeStrip {
+        struct Lower {
+            std::uint16_t* there;
+            NewEdge edge;
+        };
+        std::vector<NewEdge> edges;  ///< in the end those that the map lacks
+        std::vector<Lower> lower;    ///< those that the map has with a larger weight
+    };
+
     void findSeenThroughEdges(const GraphStorage& storage, std::uint32_t which);
     void fusePage(const View& view, GraphStorage& storage, std::uint32_t which);
-    void fuse(const View& view, Page& page, std::uint32_t slot, std::uint32_t candidate,
-              PageWork& work);
+    void update(Page& page, std::uint32_t slot, std::uint32_t candidate, float sigma,
+                PageWork& work);
     void passOver(Page& page, std::uint32_t slot, std::uint32_t candidate, PageWork& work);
     void fuseAlongRay(Page& page, std::uint32_t slot, const Candidate& seen, float depth,
                       float pixelSigma, PageWork& work);
     bool lookedThrough(const Candidate& candidate) const;
     void deleteSeenThrough(GraphStorage& storage, RiftFinder& rifts, MergeResult& result);
     void grow(const View& view, GraphStorage& storage, MergeResult& result);
+    void findFresh(const GraphStorage& storage, int strip);
     void connectNew(GraphStorage& storage, MergeResult& result);
     void connectMatched(GraphStorage& storage, MergeResult& result);
-    bool wanted(const GraphStorage& storage, VertexId a, VertexId b, std::uint16_t code) const;
+    void compareEdges(GraphStorage& storage, int strip);
+    bool wanted(const GraphStorage& storage, const NewEdge& edge) const;
     void refreshNormals(GraphStorage& storage);
     void finish(GraphStorage& storage, RiftFinder& rifts, std::int64_t& area);
     std::uint8_t openBits(std::uint8_t kinds, std::uint8_t state, float sigma) const;
@@ -67,10 +86,12 @@ class Merger {
     std::vector<PageWork> work_;         ///< beside seen_.pages
     std::vector<VertexId> vertexOf_;     ///< pixel -> vertex that it shows
     std::vector<std::uint32_t> fresh_;   ///< pixels that became vertices
+    std::vector<VertexId> freshIds_;     ///< beside fresh_
     std::vector<std::uint8_t> isFresh_;  ///< pixel -> became a vertex
     std::vector<std::uint32_t> touchedBlocks_;
     std::vector<std::uint32_t> freshPages_;
-    std::vector<std::vector<NewEdge>> wantedEdges_;
+    std::vector<FreshStrip> freshStrips_;
+    std::vector<EdgeStrip> edgeStrips_;
 };
 
 }  // namespace riftmap

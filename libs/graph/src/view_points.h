@@ -34,6 +34,8 @@ class ViewPoints {
  public:
     static constexpr std::uint16_t kNoEdge = 0xFFFF;
     static constexpr int kPatch = 4;  ///< side of the patches that share a plane [px]
+    static constexpr float kLargestStretch = 10;  ///< beyond 84 degrees no angle explains anything
+    static constexpr int kPhasePad = 1;           ///< patches of room before a row of phases_
 
     /// Eqs. (1)-(3) for a checked view; sorts pixels by what their neighbours are.
     void build(const View& view, const GraphOptions& options);
@@ -47,7 +49,7 @@ class ViewPoints {
 
     std::vector<float> z;          ///< depth [m]; 0 = no vertex
     std::vector<float> sigma;      ///< standard deviation of z [m]
-    std::vector<float> disparity;  ///< fb / z [px]; only where z > 0
+    std::vector<float> disparity;  ///< fb / z [px]; not a number where z = 0
     std::vector<float> stretch;    ///< 1 / cos of the viewing angle in [1, 10]; 0 = unknown
     std::vector<float> area;       ///< surface that the pixel stands for [m^2]
     std::vector<std::uint16_t> right, down;  ///< weight code of the edge there, or kNoEdge
@@ -58,6 +60,7 @@ class ViewPoints {
         return static_cast<std::size_t>(row) * static_cast<std::size_t>(width) +
                static_cast<std::size_t>(column);
     }
+    int patchColumns() const { return patchColumns_; }
     const PatchPlane& patch(int column, int row) const {
         return patches[static_cast<std::size_t>(row / kPatch) *
                            static_cast<std::size_t>(patchColumns_) +
@@ -82,18 +85,28 @@ class ViewPoints {
     }
 
  private:
-    void computeDepth(const View& view, int row);
-    void fitPatch(const DisparityImage& disparity, int patchColumn, int patchRow);
-    void computeAngles(int row);
+    void resize(int newWidth, int newHeight);
+    std::size_t computeDepth(const View& view, int row);
+    void fitPatches(const DisparityImage& image, int patchRow);
+    void computeAngles(int patchRow);
     float angleFromPatches(int column, int row) const;
     float angleFromNeighbours(int column, int row) const;
     void computeEdges(const GraphOptions& options, int row);
-    void computeKinds(const GraphOptions& options, int firstColumn, int row);
-    bool isHigh(const GraphOptions& options, float squared, int c, int r, int c2, int r2) const;
+    std::uint16_t explainedByAngle(std::uint16_t code, float target, int c, int r, int c2,
+                                   int r2) const;
     bool explained(int c, int r, int c2, int r2, float tolerance) const;
+    void computeKinds(const GraphOptions& options, int firstColumn, int row);
 
-    int patchColumns_ = 0;
+    int patchColumns_ = 0, patchRows_ = 0;
     std::vector<float> rayX_, rayY_;  ///< (c - cx) / fx of a column, (r - cy) / fy of a row
+    /// The disparities again, for vectors of patches: each row as kPatch planes of phaseStride_
+    /// values, columns modulo kPatch, with room before and behind; one more row without vertices.
+    std::vector<float> phases_;
+    std::size_t phaseStride_ = 0;
+    const float* phaseRow(int row) const {
+        const int known = row >= 0 && row < height ? row : height;
+        return phases_.data() + static_cast<std::size_t>(known * kPatch) * phaseStride_;
+    }
 };
 
 }  // namespace riftmap

@@ -74,6 +74,14 @@ struct Page {
         return (codes & 0x8000800080008000ULL) != 0 || (state[slot] & kOverflow) != 0;
     }
     bool living(std::uint32_t slot) const { return ((alive >> slot) & 1U) != 0; }
+    /// Neither edges nor openness nor normal.
+    void clearSlot(std::uint32_t slot) {
+        normal[slot] = 0;
+        open[slot] = 0;
+        state[slot] = 0;
+        neighbour[slot].fill(kNoVertex);
+        weight[slot].fill(0);
+    }
 };
 
 /// A cube of space and the pages that hold its vertices.
@@ -134,6 +142,16 @@ class GraphStorage {
     Eigen::Vector3f position(VertexId id) const { return page(pageOf(id)).position(slotOf(id)); }
 
     std::array<std::int32_t, 3> keyOf(const Eigen::Vector3f& p) const;
+    /// The cube of a block, to save keyOf() for points that surely lie inside.
+    struct Cube {
+        std::array<std::int32_t, 3> key{};
+        Eigen::Vector3d low, high;
+        bool surelyHolds(const Eigen::Vector3f& p) const {
+            const Eigen::Vector3d q = p.cast<double>();
+            return (q.array() > low.array()).all() && (q.array() < high.array()).all();
+        }
+    };
+    Cube cubeOf(const Eigen::Vector3f& p) const;
     /// Index of the block with this key; made if there is none.
     std::uint32_t blockAt(const std::array<std::int32_t, 3>& key);
     /// Index of the block with this key, or kNoBlock.
@@ -142,6 +160,8 @@ class GraphStorage {
 
     /// A living vertex without edges; the caller fills the arrays. Reuses freed slots.
     VertexId addVertex(std::uint32_t block);
+    /// Appends the ids of `count` living vertices; the caller clears their slots, too.
+    void addVertices(std::uint32_t block, std::uint32_t count, std::vector<VertexId>& ids);
     /// Deletes a vertex with its edges.
     void removeVertex(VertexId id);
     /// Of the living vertices of a page. Apart from the pages, so that culling reads little.
@@ -152,11 +172,28 @@ class GraphStorage {
     void updateBlockBounds(std::uint32_t block);
 
     /// Where the weight code of edge a-b is stored at a; nullptr if there is none.
-    std::uint16_t* findHalfEdge(VertexId a, VertexId b);
+    std::uint16_t* findHalfEdge(VertexId a, VertexId b) {
+        Page& p = page(pageOf(a));
+        const std::uint32_t slot = slotOf(a);
+        const auto& neighbour = p.neighbour[slot];
+        // All four at once: which of them it is cannot be foretold, and a wrong guess costs more.
+        const unsigned equal =
+            (neighbour[0] == b ? 1U : 0U) | (neighbour[1] == b ? 2U : 0U) |
+            (neighbour[2] == b ? 4U : 0U) | (neighbour[3] == b ? 8U : 0U);
+        const bool overflow = (p.state[slot] & kOverflow) != 0;
+        if (overflow && (equal & 7U) == 0) {
+            return findInChunks(neighbour[Page::kInline - 1], b);
+        }
+        return equal == 0 ? nullptr : &p.weight[slot][static_cast<unsigned>(std::countr_zero(equal))];
+    }
     const std::uint16_t* findHalfEdge(VertexId a, VertexId b) const {
         return const_cast<GraphStorage*>(this)->findHalfEdge(a, b);
     }
     std::uint32_t degree(VertexId id) const;
+    /// True from four edges on; quicker than counting them.
+    bool fullInline(VertexId id) const {
+        return page(pageOf(id)).neighbour[slotOf(id)][Page::kInline - 1] != kNoVertex;
+    }
     /// Appends b to a's list, which must have an inline slot free (parallel).
     void appendInline(VertexId a, VertexId b, std::uint16_t weight);
     /// Appends both half-edges; the edge must not exist.
@@ -229,6 +266,7 @@ class GraphStorage {
         std::size_t operator()(const std::array<std::int32_t, 3>& k) const;
     };
 
+    std::uint16_t* findInChunks(std::uint32_t first, VertexId b);
     void appendHalfEdge(VertexId a, VertexId b, std::uint16_t weight);
     bool removeHalfEdge(VertexId a, VertexId b);
     std::uint32_t newEdgeChunk();
