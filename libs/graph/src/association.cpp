@@ -139,6 +139,12 @@ void Association::projectPages(const GraphStorage& storage, const ViewPoints& vi
     in.noiseGate = kNoiseGate;
     parallelFor(pages.size(), 32, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i != end; ++i) {
+            if (i + 2 < end) {
+                const Page& next = storage.page(pages[i + 2]);
+                prefetch(&next.x, 3 * sizeof(next.x));
+                prefetch(&next.sigma, sizeof(next.sigma));
+                prefetch(&next.alive, sizeof(next.alive));
+            }
             const std::size_t k = i * Page::kSize;
             ProjectedPage out{&u_[k], &v_[k], &z_[k], &sigma_[k], &pixelOf_[k]};
             projectPage(storage.page(pages[i]), in, out);
@@ -296,6 +302,12 @@ void Association::matchStrip(const ViewPoints& view, const GraphOptions& options
                       strip.distance.data(), strip.found.data()});
         }
         for (std::size_t c = 0; c < strip.found.size(); ++c) {
+            constexpr std::size_t kAhead = 16;
+            if (c + kAhead < strip.found.size() && strip.found[c + kAhead] >= 0) {
+                const auto next = static_cast<std::size_t>(strip.found[c + kAhead]);
+                __builtin_prefetch(&claims[next]);
+                __builtin_prefetch(&pixelOf_[next]);
+            }
             matchOf[line + c] = static_cast<std::uint32_t>(strip.found[c]);
             if (strip.found[c] >= 0) {
                 const Strip::Claim claimed{matchOf[line + c], static_cast<std::uint32_t>(line + c),

@@ -15,6 +15,13 @@
 
 namespace riftmap {
 
+/// Asks for memory that will be read soon.
+inline void prefetch(const void* from, std::size_t bytes) {
+    for (std::size_t i = 0; i < bytes; i += 64) {
+        __builtin_prefetch(static_cast<const char*>(from) + i);
+    }
+}
+
 /// A vertex of the map as the view's camera would see it.
 struct Candidate {
     float u = 0, v = 0;  ///< column, row [px]
@@ -64,10 +71,10 @@ class Association {
     }
     std::size_t memoryBytes() const;
 
-    std::vector<std::uint32_t> pages;    ///< pages in view, ascending; 64 candidates each
-    std::vector<std::uint32_t> matchOf;  ///< pixel -> candidate or kNone
-    std::vector<Claims> claims;          ///< of a candidate
-    std::size_t matched = 0;             ///< pixels with a match
+    std::vector<std::uint32_t> pages;          ///< pages in view, ascending; 64 candidates each
+    std::vector<std::uint32_t> matchOf;        ///< pixel -> candidate or kNone
+    std::vector<Claims> claims;                ///< of a candidate
+    std::size_t matched = 0;                   ///< pixels with a match
     static constexpr float kAreaUnit = 1e-9F;  ///< [m^2]
 
     /// The gate of a pixel. The paper's is plain gamma.

@@ -47,8 +47,7 @@ struct Directions {
 };
 
 HWY_INLINE Directions normalised(const Directions& n) {
-    const V squared =
-        hn::Add(hn::Mul(n.x, n.x), hn::Add(hn::Mul(n.y, n.y), hn::Mul(n.z, n.z)));
+    const V squared = hn::Add(hn::Mul(n.x, n.x), hn::Add(hn::Mul(n.y, n.y), hn::Mul(n.z, n.z)));
     const V length = hn::Sqrt(squared);
     return {hn::Div(n.x, length), hn::Div(n.y, length), hn::Div(n.z, length)};
 }
@@ -69,9 +68,9 @@ HWY_INLINE Directions decodeDirections(VU code) {
     const V one = set(1.0F);
     const V z = hn::Sub(hn::Sub(one, hn::Abs(u)), hn::Abs(v));
     const M folded = hn::Lt(z, hn::Zero(d));
-    const Directions n = normalised(
-        {hn::IfThenElse(folded, hn::Mul(hn::Sub(one, hn::Abs(v)), signOf(u)), u),
-         hn::IfThenElse(folded, hn::Mul(hn::Sub(one, hn::Abs(u)), signOf(v)), v), z});
+    const Directions n =
+        normalised({hn::IfThenElse(folded, hn::Mul(hn::Sub(one, hn::Abs(v)), signOf(u)), u),
+                    hn::IfThenElse(folded, hn::Mul(hn::Sub(one, hn::Abs(u)), signOf(v)), v), z});
     const M known = hn::RebindMask(d, hn::Ne(code, hn::Zero(du)));
     return {hn::IfThenElseZero(known, n.x), hn::IfThenElseZero(known, n.y),
             hn::IfThenElseZero(known, n.z)};
@@ -87,7 +86,8 @@ HWY_INLINE VU encodeDirections(const Directions& n) {
         const V scaled = hn::Add(hn::Mul(hn::Add(x, set(1.0F)), set(32767.0F)), set(1.5F));
         return hn::BitCast(du, hn::ConvertTo(di, scaled));
     };
-    const VU low = quantised(hn::IfThenElse(below, hn::Mul(hn::Sub(one, hn::Abs(v)), signOf(u)), u));
+    const VU low =
+        quantised(hn::IfThenElse(below, hn::Mul(hn::Sub(one, hn::Abs(v)), signOf(u)), u));
     const VU high =
         quantised(hn::IfThenElse(below, hn::Mul(hn::Sub(one, hn::Abs(u)), signOf(v)), v));
     const auto known = hn::RebindMask(du, hn::Gt(sum, hn::Zero(d)));
@@ -130,8 +130,8 @@ class Fuser {
 
     /// The pixel's point in the map frame.
     HWY_INLINE Directions point() const {
-        const V x = hn::Div(hn::Mul(hn::Sub(hn::ConvertTo(d, column_), set(view_.cx)), z_),
-                            set(view_.fx));
+        const V x =
+            hn::Div(hn::Mul(hn::Sub(hn::ConvertTo(d, column_), set(view_.cx)), z_), set(view_.fx));
         const V y =
             hn::Div(hn::Mul(hn::Sub(hn::ConvertTo(d, row_), set(view_.cy)), z_), set(view_.fy));
         const auto axis = [&](Eigen::Index i) {
@@ -145,23 +145,24 @@ class Fuser {
         constexpr int kStride = sizeof(PatchPlane) / 4;
         static_assert(ViewPoints::kPatch == 4);
         const VI patchColumn = hn::ShiftRight<2>(column_), patchRow = hn::ShiftRight<2>(row_);
-        const VI at = hn::Mul(
-            hn::Add(hn::Mul(patchRow, hn::Set(di, view_.patchColumns())), patchColumn),
-            hn::Set(di, kStride));
+        const VI at =
+            hn::Mul(hn::Add(hn::Mul(patchRow, hn::Set(di, view_.patchColumns())), patchColumn),
+                    hn::Set(di, kStride));
         const auto* base = reinterpret_cast<const float*>(view_.patches.data());
         const auto field = [&](std::size_t offset) {
             return hn::GatherIndex(d, base + offset / 4, at);
         };
         const VI two = hn::Set(di, 2);
         const VI centreColumn = hn::Add(hn::ShiftLeft<2>(patchColumn), two);
-        const VI centreRow = hn::Min(hn::Add(hn::ShiftLeft<2>(patchRow), two),
-                                     hn::Set(di, view_.height - 1));
+        const VI centreRow =
+            hn::Min(hn::Add(hn::ShiftLeft<2>(patchRow), two), hn::Set(di, view_.height - 1));
         const V dc = hn::ConvertTo(d, hn::Sub(column_, centreColumn));
         const V dr = hn::ConvertTo(d, hn::Sub(row_, centreRow));
         const V expected = hn::Add(hn::Add(field(offsetof(PatchPlane, value)),
                                            hn::Mul(field(offsetof(PatchPlane, slopeColumn)), dc)),
                                    hn::Mul(field(offsetof(PatchPlane, slopeRow)), dr));
-        const V off = hn::Abs(hn::Sub(hn::GatherIndex(d, view_.disparity.data(), pixel_), expected));
+        const V off =
+            hn::Abs(hn::Sub(hn::GatherIndex(d, view_.disparity.data(), pixel_), expected));
         const std::size_t n = offsetof(PatchPlane, normal);
         const V x = field(n), y = field(n + 4), z = field(n + 8);
         normal = {dot(view_.rotation, 0, x, y, z), dot(view_.rotation, 1, x, y, z),
@@ -213,7 +214,8 @@ void fuseOf(const ViewPoints& view, Page& page, PageFusion& fusion) {
 
         const V spacing = hn::Mul(fuser.z_, set(view.footprint));
         const M noisy = hn::Gt(fuser.sigma_, hn::Mul(set(kNoisy), spacing));
-        const V length = hn::Sqrt(hn::Add(hn::Mul(dx, dx), hn::Add(hn::Mul(dy, dy), hn::Mul(dz, dz))));
+        const V length =
+            hn::Sqrt(hn::Add(hn::Mul(dx, dx), hn::Add(hn::Mul(dy, dy), hn::Mul(dz, dz))));
         const M far = hn::Gt(length, hn::Mul(set(0.02F), spacing));
         fusion.moved |= slotBits(hn::And(there, hn::AndNot(noisy, far)), slot);
         if (hn::AllFalse(d, hn::And(there, noisy))) {

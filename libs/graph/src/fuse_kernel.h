@@ -13,15 +13,15 @@ namespace riftmap {
 
 inline constexpr float kTinySigma = 1e-6F;   ///< [m]
 inline constexpr float kLeastSigma = 1e-4F;  ///< [m] nothing is known better by one view
-inline constexpr float kNoisy = 0.25F;  ///< sigma per spacing above which normals are patches'
+inline constexpr float kNoisy = 0.25F;       ///< sigma per spacing above which normals are patches'
 
 /// The matched vertices of a page.
 struct PageFusion {
-    std::uint64_t matched = 0;                         ///< slots
-    std::array<std::uint32_t, Page::kSize> pixel{};    ///< of a matched slot
-    const float* before = nullptr;                     ///< sigma of the slots until now [m]
-    std::array<float, Page::kSize> sigma{}, gain{};    ///< result: sigma now, weight of the pixel
-    std::uint64_t moved = 0;                           ///< result: slots to fit a normal to again
+    std::uint64_t matched = 0;                       ///< slots
+    std::array<std::uint32_t, Page::kSize> pixel{};  ///< of a matched slot
+    const float* before = nullptr;                   ///< sigma of the slots until now [m]
+    std::array<float, Page::kSize> sigma{}, gain{};  ///< result: sigma now, weight of the pixel
+    std::uint64_t moved = 0;                         ///< result: slots to fit a normal to again
 };
 
 /// Inverse-variance fusion of position and normal along and across the ray; writes the positions,

@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "riftmap/graph/graph_storage.h"
 
+#include <sys/mman.h>
+
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <memory>
+#include <new>
 #include <stdexcept>
 
 namespace riftmap {
@@ -31,8 +35,10 @@ GraphStorage::GraphStorage(const GraphStorage& other)
       overhang_(other.overhang_),
       vertexCount_(other.vertexCount_),
       edgeCount_(other.edgeCount_) {
-    for (const auto& chunk : other.chunks_) {
-        chunks_.push_back(std::make_unique<PageChunk>(*chunk));
+    for (std::uint32_t first = 0; first < pageCount_; first += kPagesPerChunk) {
+        chunks_.push_back(newChunk());
+        std::uninitialized_copy_n(&other.page(first), std::min(kPagesPerChunk, pageCount_ - first),
+                                  chunks_.back().get());
     }
 }
 
@@ -79,11 +85,23 @@ std::uint32_t GraphStorage::blockAt(const std::array<std::int32_t, 3>& key) {
     return it->second;
 }
 
+GraphStorage::PageChunk GraphStorage::newChunk() const {
+    PageChunk chunk(static_cast<Page*>(std::aligned_alloc(kChunkBytes, kChunkBytes)));
+    if (!chunk) {
+        throw std::bad_alloc();
+    }
+    if (!chunks_.empty()) {  // a small map does not need 2 MB at once
+        ::madvise(chunk.get(), kChunkBytes, MADV_HUGEPAGE);  // no harm where it is not possible
+    }
+    return chunk;
+}
+
 void GraphStorage::reservePages(std::uint32_t count) {
     while (pageCount_ < count) {
         if (pageCount_ % kPagesPerChunk == 0) {
-            chunks_.push_back(std::make_unique<PageChunk>());
+            chunks_.push_back(newChunk());
         }
+        new (&page(pageCount_)) Page;
         ++pageCount_;
     }
     bounds_.resize(pageCount_, emptyBounds());
@@ -328,9 +346,10 @@ bool GraphStorage::removeEdge(VertexId a, VertexId b) {
 
 std::size_t GraphStorage::memoryBytes() const {
     std::size_t bytes =
-        chunks_.size() * sizeof(PageChunk) + chunks_.capacity() * sizeof(chunks_[0]) +
-        freePages_.capacity() * sizeof(std::uint32_t) + blocks_.capacity() * sizeof(Block) +
-        edgeChunks_.capacity() * sizeof(EdgeChunk) +
+        // the first chunk is resident as far as it is used
+        (chunks_.size() <= 1 ? pageCount_ * sizeof(Page) : chunks_.size() * kChunkBytes) +
+        chunks_.capacity() * sizeof(chunks_[0]) + freePages_.capacity() * sizeof(std::uint32_t) +
+        blocks_.capacity() * sizeof(Block) + edgeChunks_.capacity() * sizeof(EdgeChunk) +
         // a node and a bucket an entry, as libstdc++ has them
         blockOfKey_.size() * (sizeof(*blockOfKey_.begin()) + 2 * sizeof(void*)) +
         blockOfKey_.bucket_count() * sizeof(void*);

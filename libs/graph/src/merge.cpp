@@ -5,7 +5,9 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <cstddef>
 
+#include "edge_kernel.h"
 #include "fuse_kernel.h"
 #include "normals.h"
 #include "riftmap/core/parallel.h"
@@ -14,10 +16,10 @@
 namespace riftmap {
 namespace {
 
-constexpr float kNoiseFactor = 3.0F;  // standard deviations
-constexpr unsigned kDeletingEvidence = 2;    // views
+constexpr float kNoiseFactor = 3.0F;                     // standard deviations
+constexpr unsigned kDeletingEvidence = 2;                // views
 constexpr std::uint32_t kWellConnected = Page::kInline;  // edges of a pixel
-constexpr std::uint32_t kMostEdges = 9;      // what fits without a second chunk
+constexpr std::uint32_t kMostEdges = 9;                  // what fits without a second chunk
 constexpr std::uint32_t kPagesAtOnce = 16;
 constexpr int kRowsAtOnce = 8;
 constexpr int kTile = 8;
@@ -44,19 +46,6 @@ void forEach(std::size_t n, std::size_t atOnce, F&& f) {
             f(i);
         }
     });
-}
-
-std::array<std::uint8_t, 3> colourAt(const cv::Mat& image, std::uint32_t pixel, int width) {
-    if (image.empty()) {
-        return {128, 128, 128};
-    }
-    const auto w = static_cast<std::uint32_t>(width);
-    const std::uint8_t* row = image.ptr<std::uint8_t>(static_cast<int>(pixel / w));
-    const std::size_t column = pixel % w;
-    if (image.channels() == 1) {
-        return {row[column], row[column], row[column]};
-    }
-    return {row[3 * column + 2], row[3 * column + 1], row[3 * column]};
 }
 
 unsigned evidenceOf(std::uint8_t state) {
@@ -93,6 +82,8 @@ MergeResult Merger::merge(const View& view, GraphStorage& storage, RiftFinder& r
     MergeResult result;
     StopWatch watch;
     points_.build(view, options_);
+    image_ = view.image.isContinuous() ? view.image : view.image.clone();
+    channels_ = image_.empty() ? 0 : static_cast<std::size_t>(image_.channels());
     times_.points = watch.lap();
     seen_.project(storage, points_, options_);
     seen_.match(points_, options_);
@@ -103,11 +94,11 @@ MergeResult Merger::merge(const View& view, GraphStorage& storage, RiftFinder& r
     forEach(work_.size(), kPagesAtOnce,
             [&](std::size_t i) { findSeenThroughEdges(storage, static_cast<std::uint32_t>(i)); });
     forEach(work_.size(), kPagesAtOnce,
-            [&](std::size_t i) { fusePage(view, storage, static_cast<std::uint32_t>(i)); });
+            [&](std::size_t i) { fusePage(storage, static_cast<std::uint32_t>(i)); });
     deleteSeenThrough(storage, rifts, result);
     times_.fuse = watch.lap();
 
-    grow(view, storage, result);
+    grow(storage, result);
     times_.grow = watch.lap();
     connectNew(storage, result);
     connectMatched(storage, result);
@@ -121,14 +112,35 @@ MergeResult Merger::merge(const View& view, GraphStorage& storage, RiftFinder& r
     return result;
 }
 
+std::array<std::uint8_t, 3> Merger::colourAt(std::size_t pixel) const {
+    const std::uint8_t* at = image_.data + channels_ * pixel;
+    if (channels_ == 0) {
+        return {128, 128, 128};
+    }
+    return channels_ == 1 ? std::array{at[0], at[0], at[0]} : std::array{at[2], at[1], at[0]};
+}
+
+/// Asks for the page in view that comes next: pages lie anywhere, so the processor cannot foresee.
+void Merger::prefetchPage(const GraphStorage& storage, std::uint32_t which) const {
+    if (which < seen_.pages.size()) {
+        const Page& page = storage.page(seen_.pages[which]);
+        prefetch(&page.sigma, offsetof(Page, neighbour) - offsetof(Page, sigma));
+        prefetch(&page.weight, sizeof(page.weight));
+    }
+}
+
 void Merger::findSeenThroughEdges(const GraphStorage& storage, std::uint32_t which) {
     const std::uint32_t index = seen_.pages[which];
     const Page& page = storage.page(index);
     const auto inCamera = [this](const Eigen::Vector3f& p) -> Eigen::Vector3f {
         return points_.rotation.transpose() * (p - points_.translation);
     };
-    forEachBit(page.alive, [&](std::uint32_t slot) {
-        if (!page.mayHaveHighEdge(slot) || !seen_.inView(which * Page::kSize + slot)) {
+    prefetchPage(storage, which + 1);
+    if (!page.mayHaveHighEdges()) {
+        return;
+    }
+    forEachBit(seen_.slotsInView(which), [&](std::uint32_t slot) {
+        if (!page.mayHaveHighEdge(slot)) {
             return;
         }
         const VertexId id = GraphStorage::idOf(index, slot);
@@ -263,7 +275,7 @@ void Merger::fuseAlongRay(Page& page, std::uint32_t slot, const Candidate& seen,
     work.touched = work.touched || before != 0;
 }
 
-void Merger::fusePage(const View& view, GraphStorage& storage, std::uint32_t which) {
+void Merger::fusePage(GraphStorage& storage, std::uint32_t which) {
     Page& page = storage.page(seen_.pages[which]);
     PageWork& work = work_[which];
     const std::uint32_t first = which * Page::kSize;
@@ -287,7 +299,7 @@ void Merger::fusePage(const View& view, GraphStorage& storage, std::uint32_t whi
     work.moved = fusion.moved;
     forEachBit(fusion.matched, [&](std::uint32_t slot) {
         const float gain = fusion.gain[slot];
-        const auto colour = colourAt(view.image, fusion.pixel[slot], points_.width);
+        const auto colour = colourAt(fusion.pixel[slot]);
         for (std::size_t i = 0; i < 3; ++i) {
             const float before = page.rgb[slot][i];
             page.rgb[slot][i] = static_cast<std::uint8_t>(
@@ -371,10 +383,11 @@ void Merger::findFresh(const GraphStorage& storage, int strip) {
     }
 }
 
-void Merger::grow(const View& view, GraphStorage& storage, MergeResult& result) {
+void Merger::grow(GraphStorage& storage, MergeResult& result) {
     const std::size_t n = points_.z.size();
-    vertexOf_.resize(n);
-    isFresh_.resize(n);
+    const std::size_t behind = static_cast<std::size_t>(points_.width) + kEdgePadding;
+    vertexOf_.resize(n + behind, kNoVertex);
+    isFresh_.resize(n + behind, 0);
     freshStrips_.resize(static_cast<std::size_t>((points_.height + kTile - 1) / kTile));
     forEach(freshStrips_.size(), 2,
             [&](std::size_t strip) { findFresh(storage, static_cast<int>(strip)); });
@@ -403,7 +416,7 @@ void Merger::grow(const View& view, GraphStorage& storage, MergeResult& result) 
         page.z[slot] = p.z();
         page.sigma[slot] = compact::Sigma::encode(std::max(points_.sigma[pixel], kLeastSigma));
         page.area[slot] = compact::Area::encode(points_.area[pixel]);
-        page.rgb[slot] = colourAt(view.image, pixel, points_.width);
+        page.rgb[slot] = colourAt(pixel);
         const bool fine = points_.spacing(pixel) <= static_cast<float>(options_.targetResolution);
         page.state[slot] = static_cast<std::uint8_t>((points_.kinds[pixel] == 0 ? kSurrounded : 0) |
                                                      (fine ? kFineEnough : 0));
@@ -447,58 +460,57 @@ bool Merger::wanted(const GraphStorage& storage, const NewEdge& e) const {
         return true;
     }
     // Between two vertices that have their four neighbours each, a further low edge says nothing.
+    const bool high = (e.code & compact::kHighBit) != 0;
+    if (!high && storage.fullInline(e.a) && storage.fullInline(e.b)) {
+        return false;
+    }
     const std::uint32_t da = storage.degree(e.a), db = storage.degree(e.b);
     if (da >= kMostEdges || db >= kMostEdges) {
         return false;
     }
-    return (e.code & compact::kHighBit) != 0 || da < kWellConnected || db < kWellConnected;
+    return high || da < kWellConnected || db < kWellConnected;
 }
 
 /// Edges of the view between vertices that are not both new: lowers the weights of those that the
-/// map has, lists those it lacks. What becomes of an edge cannot be foretold, so the edges pass
-/// through lists, each step over all that are left: there are no branches to guess wrong.
+/// map has, lists those it lacks. What becomes of an edge cannot be foretold, so each step passes
+/// on those that are left to the next: there are no branches to guess wrong.
 void Merger::compareEdges(GraphStorage& storage, int strip) {
     EdgeStrip& lists = edgeStrips_[static_cast<std::size_t>(strip)];
     const int first = strip * kRowsAtOnce, end = std::min(points_.height, first + kRowsAtOnce);
     const auto w = static_cast<std::size_t>(points_.width);
-    lists.edges.resize(2 * w * static_cast<std::size_t>(kRowsAtOnce));
-    lists.lower.resize(lists.edges.size());
-    NewEdge* out = lists.edges.data();
-    const auto list = [&](std::size_t i, std::size_t j, std::uint16_t code) {
-        const VertexId a = vertexOf_[i], b = vertexOf_[j];
-        *out = {a, b, code};
-        out += (code != ViewPoints::kNoEdge) & (a != b) & ((isFresh_[i] & isFresh_[j]) == 0) ? 1 : 0;
-    };
-    for (int r = first; r < end; ++r) {
-        const std::size_t line = points_.index(0, r);
-        for (std::size_t i = line; i < line + w; ++i) {
-            const std::size_t right = i + 1 < vertexOf_.size() ? i + 1 : i;  // no edge from there
-            const std::size_t below = i + w < vertexOf_.size() ? i + w : i;
-            list(i, right, points_.right[i]);
-            list(i, below, points_.down[i]);
-        }
+    const std::size_t line = points_.index(0, first);
+    const std::size_t pixels = w * static_cast<std::size_t>(end - first);
+    lists.resize(2 * pixels + 2 * kEdgePadding);
+    VertexId *a = lists.a.data(), *b = lists.b.data();
+    std::uint32_t* code = lists.code.data();
+    std::size_t count = 0;
+    for (const auto& [codes, ahead] :
+         {std::pair{points_.right.data(), std::size_t{1}}, std::pair{points_.down.data(), w}}) {
+        count += listEdges({&vertexOf_[line], &isFresh_[line], codes + line, pixels, ahead},
+                           a + count, b + count, code + count);
     }
-    const std::size_t count = static_cast<std::size_t>(out - lists.edges.data());
-    NewEdge* missing = lists.edges.data();
+    NewEdge* missing = lists.missing.data();
     EdgeStrip::Lower* lower = lists.lower.data();
     for (std::size_t e = 0; e < count; ++e) {
-        const NewEdge edge = lists.edges[e];
-        std::uint16_t* there = storage.findHalfEdge(edge.a, edge.b);
-        const std::uint16_t old = there != nullptr ? weightAt(*there) : edge.code;
-        *lower = {there, edge};
-        lower += compact::smallerWeight(old, edge.code) != old ? 1 : 0;
-        const bool dull = (edge.code & compact::kHighBit) == 0 && storage.fullInline(edge.a) &&
-                          storage.fullInline(edge.b);
-        *missing = edge;
-        missing += (there == nullptr) & (!dull | paper()) ? 1 : 0;
+        constexpr std::size_t kAhead = 16;
+        storage.prefetchEdges(a[std::min(e + kAhead, count - 1)]);
+        const GraphStorage::HalfEdge found = storage.lookUp(a[e], b[e]);
+        const auto seen = static_cast<std::uint16_t>(code[e]);
+        const std::uint16_t old = weightAt(*found.weight);
+        *lower = {found.weight, a[e], b[e], seen};
+        lower += static_cast<unsigned>(found.there) &
+                 static_cast<unsigned>(compact::smallerWeight(old, seen) != old);
+        *missing = {a[e], b[e], seen};
+        missing += static_cast<unsigned>(!found.there);
     }
     for (const auto* l = lists.lower.data(); l != lower; ++l) {
-        if (lowerWeight(*l->there, l->edge.code)) {
-            lowerWeight(*storage.findHalfEdge(l->edge.b, l->edge.a), l->edge.code);
+        if (lowerWeight(*l->there, l->code)) {
+            lowerWeight(*storage.findHalfEdge(l->b, l->a), l->code);
         }
     }
-    lists.edges.resize(static_cast<std::size_t>(missing - lists.edges.data()));
-    std::erase_if(lists.edges, [&](const NewEdge& e) { return !wanted(storage, e); });
+    missing = std::remove_if(lists.missing.data(), missing,
+                             [&](const NewEdge& e) { return !wanted(storage, e); });
+    lists.lacking = static_cast<std::size_t>(missing - lists.missing.data());
 }
 
 void Merger::connectMatched(GraphStorage& storage, MergeResult& result) {
@@ -506,7 +518,7 @@ void Merger::connectMatched(GraphStorage& storage, MergeResult& result) {
     forEach(edgeStrips_.size(), 1,
             [&](std::size_t strip) { compareEdges(storage, static_cast<int>(strip)); });
     for (const EdgeStrip& strip : edgeStrips_) {
-        for (const NewEdge& e : strip.edges) {
+        for (const NewEdge& e : strip.wanted()) {
             if (std::uint16_t* there = storage.findHalfEdge(e.a, e.b)) {
                 lowerWeight(*there, e.code);
                 lowerWeight(*storage.findHalfEdge(e.b, e.a), e.code);
@@ -544,7 +556,7 @@ void Merger::refreshNormals(GraphStorage& storage) {
     if (paper()) {  // positions stay, but neighbours were added
         std::vector<VertexId> ends;
         for (const EdgeStrip& strip : edgeStrips_) {
-            for (const NewEdge& e : strip.edges) {
+            for (const NewEdge& e : strip.wanted()) {
                 ends.push_back(e.a);
                 ends.push_back(e.b);
             }
@@ -580,7 +592,7 @@ void Merger::finish(GraphStorage& storage, RiftFinder& rifts, std::int64_t& area
         }
     }
     for (const EdgeStrip& strip : edgeStrips_) {
-        for (const NewEdge& e : strip.edges) {
+        for (const NewEdge& e : strip.wanted()) {
             rifts.touch(storage.page(GraphStorage::pageOf(e.a)).block);
             rifts.touch(storage.page(GraphStorage::pageOf(e.b)).block);
         }
@@ -600,8 +612,7 @@ void Merger::finish(GraphStorage& storage, RiftFinder& rifts, std::int64_t& area
 std::size_t Merger::memoryBytes() const {
     const std::size_t pixels = points_.z.capacity();
     return pixels * (3 * sizeof(float) + 2 * sizeof(std::uint16_t) + 2 + 5 * sizeof(VertexId)) +
-           points_.patches.capacity() * sizeof(PatchPlane) +
-           seen_.memoryBytes() +
+           points_.patches.capacity() * sizeof(PatchPlane) + seen_.memoryBytes() +
            work_.capacity() * sizeof(PageWork);
 }
 

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -49,14 +50,28 @@ class Merger {
     struct EdgeStrip {
         struct Lower {
             std::uint16_t* there;
-            NewEdge edge;
+            VertexId a, b;
+            std::uint16_t code;
         };
-        std::vector<NewEdge> edges;  ///< in the end those that the map lacks
-        std::vector<Lower> lower;    ///< those that the map has with a larger weight
+        // Buffers; only the first so many elements count.
+        std::vector<VertexId> a, b;
+        std::vector<std::uint32_t> code;
+        std::vector<Lower> lower;      ///< edges that the map has with a larger weight
+        std::vector<NewEdge> missing;  ///< those that it lacks
+        std::size_t lacking = 0;
+        std::span<const NewEdge> wanted() const { return {missing.data(), lacking}; }
+        void resize(std::size_t n) {
+            a.resize(n);
+            b.resize(n);
+            code.resize(n);
+            lower.resize(n);
+            missing.resize(n);
+        }
     };
 
+    void prefetchPage(const GraphStorage& storage, std::uint32_t which) const;
     void findSeenThroughEdges(const GraphStorage& storage, std::uint32_t which);
-    void fusePage(const View& view, GraphStorage& storage, std::uint32_t which);
+    void fusePage(GraphStorage& storage, std::uint32_t which);
     void update(Page& page, std::uint32_t slot, std::uint32_t candidate, float sigma,
                 PageWork& work);
     void passOver(Page& page, std::uint32_t slot, std::uint32_t candidate, PageWork& work);
@@ -64,7 +79,7 @@ class Merger {
                       float pixelSigma, PageWork& work);
     bool lookedThrough(const Candidate& candidate) const;
     void deleteSeenThrough(GraphStorage& storage, RiftFinder& rifts, MergeResult& result);
-    void grow(const View& view, GraphStorage& storage, MergeResult& result);
+    void grow(GraphStorage& storage, MergeResult& result);
     void findFresh(const GraphStorage& storage, int strip);
     void connectNew(GraphStorage& storage, MergeResult& result);
     void connectMatched(GraphStorage& storage, MergeResult& result);
@@ -79,9 +94,14 @@ class Merger {
     }
     bool paper() const { return options_.fusion == GraphOptions::Fusion::kFirst; }
 
+    /// Red, green, blue; grey where the view has no image.
+    std::array<std::uint8_t, 3> colourAt(std::size_t pixel) const;
+
     GraphOptions options_;
     MergeTimes times_;
     ViewPoints points_;
+    cv::Mat image_;             ///< of the view, its rows one after the other
+    std::size_t channels_ = 0;  ///< 0 without an image
     Association seen_;
     std::vector<PageWork> work_;         ///< beside seen_.pages
     std::vector<VertexId> vertexOf_;     ///< pixel -> vertex that it shows

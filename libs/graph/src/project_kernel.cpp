@@ -64,8 +64,9 @@ void projectOf(const Page& page, const Projection& in, ProjectedPage& out) {
         const V dy = hn::Sub(hn::LoadU(d, page.y.data() + slot), set(in.translation[1]));
         const V dz = hn::Sub(hn::LoadU(d, page.z.data() + slot), set(in.translation[2]));
         const auto along = [&](std::size_t axis) {
-            return hn::Add(hn::Add(hn::Mul(set(r[3 * axis]), dx), hn::Mul(set(r[3 * axis + 1]), dy)),
-                           hn::Mul(set(r[3 * axis + 2]), dz));
+            return hn::Add(
+                hn::Add(hn::Mul(set(r[3 * axis]), dx), hn::Mul(set(r[3 * axis + 1]), dy)),
+                hn::Mul(set(r[3 * axis + 2]), dz));
         };
         const V z = along(2);
         const V u = hn::Add(hn::Div(hn::Mul(set(in.fx), along(0)), z), set(in.cx));
@@ -76,9 +77,8 @@ void projectOf(const Page& page, const Projection& in, ProjectedPage& out) {
         const VI zero = hn::Zero(di);
         const VI column = hn::Min(hn::Max(rounded(u), zero), hn::Set(di, in.width - 1));
         const VI row = hn::Min(hn::Max(rounded(v), zero), hn::Set(di, in.height - 1));
-        const VI tile =
-            hn::Add(hn::Mul(hn::ShiftRight<3>(row), hn::Set(di, in.tileColumns)),
-                    hn::ShiftRight<3>(column));
+        const VI tile = hn::Add(hn::Mul(hn::ShiftRight<3>(row), hn::Set(di, in.tileColumns)),
+                                hn::ShiftRight<3>(column));
         const V sigma = sigmaOf(page.sigma.data() + slot);
         // What lies farther is hidden behind everything the view shows there.
         const V farthest =
@@ -104,8 +104,7 @@ void projectOf(const Page& page, const Projection& in, ProjectedPage& out) {
 void reachOf(const ReachRow& in, float* most) {
     const auto step = static_cast<int>(hn::Lanes(d));
     for (int c = 0; c < in.width; c += step) {
-        const auto there =
-            hn::FirstN(d, static_cast<std::size_t>(std::min(step, in.width - c)));
+        const auto there = hn::FirstN(d, static_cast<std::size_t>(std::min(step, in.width - c)));
         const V z = hn::MaskedLoad(there, d, in.z + c);
         V gate = set(in.gamma);
         if (!in.gammaOnly) {  // gateOf

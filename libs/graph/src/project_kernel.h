@@ -15,11 +15,11 @@ struct Projection {
     std::array<float, 3> translation{};
     float fx = 1, fy = 1, cx = 0, cy = 0;
     int width = 0, height = 0;
-    float nearest = 0;                    ///< [m] what lies nearer is not in view
-    float border = 0;                     ///< [px] room around the image
-    const float* reach = nullptr;         ///< tile -> depth beyond which nothing matches [m]
-    int tileColumns = 0;                  ///< tiles of 8 x 8 pixels in a row
-    float noiseGate = 0;                  ///< standard deviations a vertex may lie behind that
+    float nearest = 0;             ///< [m] what lies nearer is not in view
+    float border = 0;              ///< [px] room around the image
+    const float* reach = nullptr;  ///< tile -> depth beyond which nothing matches [m]
+    int tileColumns = 0;           ///< tiles of 8 x 8 pixels in a row
+    float noiseGate = 0;           ///< standard deviations a vertex may lie behind that
 };
 
 /// The 64 vertices of a page as the camera would see them.

@@ -111,9 +111,9 @@ class Windows {
         constexpr std::array<Place, 5> kFar = {{{0, -1}, {3, -1}, {2, 0}, {1, 1}, {0, 2}}};
         const bool anyNoisy = !hn::AllFalse(d, noisy), allNoisy = hn::AllTrue(d, noisy);
         const auto at = [&](const float* row, const Place& place) {
-            return hn::LoadU(d, row + static_cast<std::size_t>(place.plane) * in.stride +
-                                    static_cast<std::size_t>(first + ViewPoints::kPhasePad +
-                                                             place.shift));
+            return hn::LoadU(
+                d, row + static_cast<std::size_t>(place.plane) * in.stride +
+                       static_cast<std::size_t>(first + ViewPoints::kPhasePad + place.shift));
         };
         for (std::size_t r = 0; r < 5; ++r) {
             for (std::size_t c = 0; c < 5; ++c) {
@@ -167,8 +167,8 @@ void fitPatches(const PatchRow& in) {
         // Where noise hides the slope between neighbours, look farther.
         const M noisy = hn::Gt(sigma, hn::Mul(hn::Mul(set(0.25F), z), set(in.footprint)));
         const V radius = hn::IfThenElse(noisy, set(6.0F), set(2.0F));
-        const V steepest = hn::Div(set(ViewPoints::kLargestStretch * in.fb),
-                                   hn::Mul(set(in.fx), z));
+        const V steepest =
+            hn::Div(set(ViewPoints::kLargestStretch * in.fb), hn::Mul(set(in.fx), z));
         const V wide = hn::Add(hn::Mul(set(4.0F), deviation), hn::Mul(steepest, radius));
         const V tolerance = hn::Add(hn::Mul(set(3.0F), deviation), set(0.05F));
 
@@ -182,15 +182,15 @@ void fitPatches(const PatchRow& in) {
         HWY_ALIGN std::array<float, kMost> right{};
         for (int k = 0; k < n; ++k) {
             right[static_cast<std::size_t>(k)] =
-                in.cx - static_cast<float>((first + k) * ViewPoints::kPatch + ViewPoints::kPatch / 2);
+                in.cx -
+                static_cast<float>((first + k) * ViewPoints::kPatch + ViewPoints::kPatch / 2);
         }
         const V x = hn::Div(a, set(in.fb / in.fx));
         const V y = hn::Div(hn::Mul(b, set(in.fy)), fb);
         const V ahead = hn::Add(hn::Add(value, hn::Mul(hn::Load(d, right.data()), a)),
                                 hn::Mul(set(in.cy - static_cast<float>(in.row)), b));
         const V zc = hn::Div(ahead, fb);
-        const V length =
-            hn::Sqrt(hn::Add(hn::Mul(x, x), hn::Add(hn::Mul(y, y), hn::Mul(zc, zc))));
+        const V length = hn::Sqrt(hn::Add(hn::Mul(x, x), hn::Add(hn::Mul(y, y), hn::Mul(zc, zc))));
 
         HWY_ALIGN std::array<std::array<float, kMost>, 8> out;
         hn::Store(a, d, out[0].data());
@@ -229,13 +229,12 @@ void anglesOf(const AngleRow& in, std::uint8_t* onPlane) {
     for (int c = 0; c < in.width; c += lanes()) {
         const int left = in.width - c;
         const V z = load(in.z + c, left);
-        const V expected = hn::Add(load(in.value + c, left), hn::Mul(load(in.slopeRow + c, left),
-                                                                     set(in.rowsFromCentre)));
+        const V expected = hn::Add(load(in.value + c, left),
+                                   hn::Mul(load(in.slopeRow + c, left), set(in.rowsFromCentre)));
         const V off = hn::Abs(hn::Sub(load(in.disparity + c, left), expected));
         const M on = hn::And(hn::Le(off, load(in.tolerance + c, left)), hn::Gt(z, hn::Zero(d)));
         // cos = |n . ray| / |ray| and z = distance / (n . ray)
-        const V angle =
-            hn::Mul(hn::Mul(load(in.inverse + c, left), z), rayLength(in, c, left));
+        const V angle = hn::Mul(hn::Mul(load(in.inverse + c, left), z), rayLength(in, c, left));
         const V most = set(ViewPoints::kLargestStretch);
         const V clamped = hn::Min(hn::Max(angle, set(1.0F)), most);
         store(hn::IfThenElseZero(hn::And(on, hn::Gt(angle, hn::Zero(d))), clamped), in.stretch + c,
@@ -255,8 +254,7 @@ void areasOf(const AngleRow& in) {
     for (int c = 0; c < in.width; c += lanes()) {
         const int left = in.width - c;
         const V z = load(in.z + c, left);
-        const V surface =
-            hn::Mul(hn::Mul(z, z), hn::Max(set(1.0F), load(in.stretch + c, left)));
+        const V surface = hn::Mul(hn::Mul(z, z), hn::Max(set(1.0F), load(in.stretch + c, left)));
         store(hn::Div(surface, hn::Mul(set(in.fxfy), rayLength(in, c, left))), in.area + c, left);
     }
 }
@@ -269,8 +267,8 @@ void edgesOf(const EdgeRow& in) {
     for (int c = 0; c < in.count; c += lanes()) {
         const int left = in.count - c;
         const V z = load(in.z + c, left), z2 = load(in.z2 + c, left);
-        const V dx = hn::Sub(hn::Mul(load(in.rayX2 + c, left), z2),
-                             hn::Mul(load(in.rayX + c, left), z));
+        const V dx =
+            hn::Sub(hn::Mul(load(in.rayX2 + c, left), z2), hn::Mul(load(in.rayX + c, left), z));
         const V dy = hn::Sub(hn::Mul(set(in.rayY2), z2), hn::Mul(set(in.rayY), z));
         const V dz = hn::Sub(z2, z);
         const V squared = hn::Add(hn::Add(square(dx), square(dy)), square(dz));
@@ -281,9 +279,9 @@ void edgesOf(const EdgeRow& in) {
             const V spacing = hn::Mul(set(in.footprint), hn::Max(z, z2));
             high = hn::Gt(squared, square(hn::Add(set(in.target), spacing)));
             if (!hn::AllFalse(d, high)) {
-                const V noise = hn::Mul(set(3.0F),
-                                        hn::Sqrt(hn::Add(square(load(in.sigma + c, left)),
-                                                         square(load(in.sigma2 + c, left)))));
+                const V noise =
+                    hn::Mul(set(3.0F), hn::Sqrt(hn::Add(square(load(in.sigma + c, left)),
+                                                        square(load(in.sigma2 + c, left)))));
                 const V tolerance = hn::Add(set(in.target), noise);
                 high = hn::And(high, hn::Gt(squared, square(hn::Add(tolerance, spacing))));
             }
@@ -291,10 +289,9 @@ void edgesOf(const EdgeRow& in) {
         // compact::Weight::encode(sqrt(squared))
         using Weight = compact::Weight;
         const auto bits = hn::BitCast(di, hn::Sqrt(squared));
-        const auto rounded =
-            hn::Sub(hn::ShiftRight<Weight::kShift>(
-                        hn::Add(bits, hn::Set(di, 1 << (Weight::kShift - 1)))),
-                    hn::Set(di, Weight::kBias));
+        const auto rounded = hn::Sub(
+            hn::ShiftRight<Weight::kShift>(hn::Add(bits, hn::Set(di, 1 << (Weight::kShift - 1)))),
+            hn::Set(di, Weight::kBias));
         const auto weight =
             hn::Min(hn::Max(rounded, hn::Zero(di)), hn::Set(di, std::int32_t{0x7FFE}));
         const auto flagged =
@@ -321,10 +318,10 @@ void kindsOf(const KindRow& in) {
         return code == ViewPoints::kNoEdge ? none : step;
     };
     for (int c = 1; c + 1 < in.width; ++c) {
-        const unsigned bits =
-            look(in.right[c], c + 1 < in.firstColumn) | look(in.down[c], c < in.firstColumn) |
-            look(in.right[c - 1], c - 1 < in.firstColumn) |
-            look(in.downAbove[c], c < in.firstColumn);
+        const unsigned bits = look(in.right[c], c + 1 < in.firstColumn) |
+                              look(in.down[c], c < in.firstColumn) |
+                              look(in.right[c - 1], c - 1 < in.firstColumn) |
+                              look(in.downAbove[c], c < in.firstColumn);
         in.kinds[c] = static_cast<std::uint8_t>(in.z[c] > 0 ? bits : 0U);
     }
 }

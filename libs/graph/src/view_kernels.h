@@ -21,8 +21,9 @@ struct DepthRow {
 /// Depth and its noise, sec. IV.A; returns the number of vertices.
 std::size_t depthsOfRow(const DepthRow& row);
 
-/// A row of patches. Image rows are given by columns modulo 4, a plane of `stride` values each, with
-/// ViewPoints::kPhasePad values before the first column; rows outside of the image are all invalid.
+/// A row of patches. Image rows are given by columns modulo 4, a plane of `stride` values each,
+/// with ViewPoints::kPhasePad values before the first column; rows outside of the image are all
+/// invalid.
 struct PatchRow {
     static constexpr int kWindow = 5;
     const float *near[kWindow] = {}, *far[kWindow] = {};  ///< 1 and 3 rows apart, middle = centre

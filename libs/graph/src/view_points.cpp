@@ -38,8 +38,8 @@ void ViewPoints::resize(int newWidth, int newHeight) {
     for (auto* values : {&z, &sigma, &disparity, &stretch, &area}) {
         values->resize(n);
     }
-    right.resize(n);
-    down.resize(n);
+    right.resize(n + 64, kNoEdge);  // vector code reads whole vectors
+    down.resize(n + 64, kNoEdge);
     kinds.resize(n);
     rayX_.resize(static_cast<std::size_t>(width));
     rayY_.resize(static_cast<std::size_t>(height));
@@ -218,8 +218,8 @@ std::uint16_t ViewPoints::explainedByAngle(std::uint16_t code, float target, int
                                            int r2) const {
     const std::size_t i = index(c, r), j = index(c2, r2);
     const float noise = kNoiseFactor * std::sqrt(sigma[i] * sigma[i] + sigma[j] * sigma[j]);
-    const bool low = explained(c, r, c2, r2, target + noise) ||
-                     explained(c2, r2, c, r, target + noise);
+    const bool low =
+        explained(c, r, c2, r2, target + noise) || explained(c2, r2, c, r, target + noise);
     return low ? static_cast<std::uint16_t>(code & ~compact::kHighBit) : code;
 }
 

@@ -33,7 +33,7 @@ struct PatchPlane {
 class ViewPoints {
  public:
     static constexpr std::uint16_t kNoEdge = 0xFFFF;
-    static constexpr int kPatch = 4;  ///< side of the patches that share a plane [px]
+    static constexpr int kPatch = 4;              ///< side of the patches that share a plane [px]
     static constexpr float kLargestStretch = 10;  ///< beyond 84 degrees no angle explains anything
     static constexpr int kPhasePad = 1;           ///< patches of room before a row of phases_
 

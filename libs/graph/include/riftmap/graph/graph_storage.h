@@ -9,6 +9,7 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <cstdlib>
 #include <cstring>
 #include <limits>
 #include <memory>
@@ -53,25 +54,39 @@ struct PageBounds {
 struct Page {
     static constexpr std::uint32_t kSize = 64;
     static constexpr std::uint32_t kInline = 4;  ///< half-edges stored beside the vertex
+    static constexpr std::uint64_t kHighBits = 0x0001000100010001ULL * compact::kHighBit;
 
-    std::array<float, kSize> x{}, y{}, z{};     ///< map frame [m]
-    std::array<std::uint32_t, kSize> normal{};  ///< compact::encodeDirection
-    std::array<std::uint16_t, kSize> sigma{};   ///< compact::Sigma
-    std::array<std::uint16_t, kSize> area{};    ///< compact::Area
-    std::array<std::array<std::uint8_t, 3>, kSize> rgb{};
-    std::array<std::uint8_t, kSize> open{};   ///< OpenKind
-    std::array<std::uint8_t, kSize> state{};  ///< VertexState
-    std::array<std::array<VertexId, kInline>, kSize> neighbour{};
-    std::array<std::array<std::uint16_t, kInline>, kSize> weight{};
+    // Not set to anything: a page is first written to where a vertex is.
+    std::array<float, kSize> x, y, z;         ///< map frame [m]
+    std::array<std::uint32_t, kSize> normal;  ///< compact::encodeDirection
+    std::array<std::uint16_t, kSize> sigma;   ///< compact::Sigma
+    std::array<std::uint16_t, kSize> area;    ///< compact::Area
+    std::array<std::array<std::uint8_t, 3>, kSize> rgb;
+    std::array<std::uint8_t, kSize> open;   ///< OpenKind
+    std::array<std::uint8_t, kSize> state;  ///< VertexState
+    std::array<std::array<VertexId, kInline>, kSize> neighbour;
+    std::array<std::array<std::uint16_t, kInline>, kSize> weight;
 
     std::uint64_t alive = 0;            ///< a bit a slot
     std::uint32_t block = 0xFFFFFFFFU;  ///< index of its block
     Eigen::Vector3f position(std::uint32_t slot) const { return {x[slot], y[slot], z[slot]}; }
-    /// False if no edge of the vertex is high; true if one may be. Free slots have weight 0.
+    /// False if no edge of any vertex is high; true if one may be.
+    bool mayHaveHighEdges() const {
+        std::uint64_t codes = 0;
+        unsigned states = 0;
+        for (std::uint32_t slot = 0; slot < kSize; ++slot) {
+            std::uint64_t four = 0;
+            std::memcpy(&four, weight[slot].data(), sizeof(four));
+            codes |= four;
+            states |= state[slot];
+        }
+        return (codes & kHighBits) != 0 || (states & kOverflow) != 0;
+    }
+    /// Likewise for one vertex. Its free places have weight 0.
     bool mayHaveHighEdge(std::uint32_t slot) const {
         std::uint64_t codes = 0;
         std::memcpy(&codes, weight[slot].data(), sizeof(codes));
-        return (codes & 0x8000800080008000ULL) != 0 || (state[slot] & kOverflow) != 0;
+        return (codes & kHighBits) != 0 || (state[slot] & kOverflow) != 0;
     }
     bool living(std::uint32_t slot) const { return ((alive >> slot) & 1U) != 0; }
     /// Neither edges nor openness nor normal.
@@ -127,10 +142,16 @@ class GraphStorage {
 
     std::uint32_t pageCount() const { return pageCount_; }
     Page& page(std::uint32_t index) {
-        return (*chunks_[index / kPagesPerChunk])[index % kPagesPerChunk];
+        return chunks_[index / kPagesPerChunk].get()[index % kPagesPerChunk];
     }
     const Page& page(std::uint32_t index) const {
-        return (*chunks_[index / kPagesPerChunk])[index % kPagesPerChunk];
+        return chunks_[index / kPagesPerChunk].get()[index % kPagesPerChunk];
+    }
+    /// Asks for the lines that findHalfEdge(id, ...) will read.
+    void prefetchEdges(VertexId id) const {
+        const Page& p = page(pageOf(id));
+        __builtin_prefetch(&p.neighbour[slotOf(id)]);
+        __builtin_prefetch(&p.weight[slotOf(id)]);
     }
     const std::vector<Block>& blocks() const { return blocks_; }
     std::vector<Block>& blocks() { return blocks_; }
@@ -173,18 +194,26 @@ class GraphStorage {
 
     /// Where the weight code of edge a-b is stored at a; nullptr if there is none.
     std::uint16_t* findHalfEdge(VertexId a, VertexId b) {
+        const HalfEdge found = lookUp(a, b);
+        return found.there ? found.weight : nullptr;
+    }
+    /// The same for many edges one after the other: which edges there are cannot be foretold, so
+    /// the usual way has no branch. `weight` may be read even if the edge is not there.
+    struct HalfEdge {
+        std::uint16_t* weight;
+        bool there;
+    };
+    HalfEdge lookUp(VertexId a, VertexId b) {
         Page& p = page(pageOf(a));
         const std::uint32_t slot = slotOf(a);
         const auto& neighbour = p.neighbour[slot];
-        // All four at once: which of them it is cannot be foretold, and a wrong guess costs more.
-        const unsigned equal =
-            (neighbour[0] == b ? 1U : 0U) | (neighbour[1] == b ? 2U : 0U) |
-            (neighbour[2] == b ? 4U : 0U) | (neighbour[3] == b ? 8U : 0U);
-        const bool overflow = (p.state[slot] & kOverflow) != 0;
-        if (overflow && (equal & 7U) == 0) {
-            return findInChunks(neighbour[Page::kInline - 1], b);
+        const unsigned equal = (neighbour[0] == b ? 1U : 0U) | (neighbour[1] == b ? 2U : 0U) |
+                               (neighbour[2] == b ? 4U : 0U) | (neighbour[3] == b ? 8U : 0U);
+        if ((p.state[slot] & kOverflow) != 0 && (equal & 7U) == 0) {
+            std::uint16_t* found = findInChunks(neighbour[Page::kInline - 1], b);
+            return {found != nullptr ? found : p.weight[slot].data(), found != nullptr};
         }
-        return equal == 0 ? nullptr : &p.weight[slot][static_cast<unsigned>(std::countr_zero(equal))];
+        return {&p.weight[slot][static_cast<unsigned>(std::countr_zero(equal | 8U))], equal != 0};
     }
     const std::uint16_t* findHalfEdge(VertexId a, VertexId b) const {
         return const_cast<GraphStorage*>(this)->findHalfEdge(a, b);
@@ -259,8 +288,15 @@ class GraphStorage {
     std::size_t rebuild();
 
  private:
-    static constexpr std::uint32_t kPagesPerChunk = 16;
-    using PageChunk = std::array<Page, kPagesPerChunk>;
+    /// Pages are allocated by chunks as large as the pages of the processor's memory management
+    /// can be: a view touches thousands of pages, and new memory comes in fewer, larger pieces.
+    static constexpr std::size_t kChunkBytes = std::size_t{2} << 20U;
+    static constexpr std::uint32_t kPagesPerChunk = kChunkBytes / sizeof(Page);
+    struct FreeChunk {
+        void operator()(Page* pages) const { std::free(pages); }
+    };
+    using PageChunk = std::unique_ptr<Page, FreeChunk>;
+    PageChunk newChunk() const;
 
     struct KeyHash {
         std::size_t operator()(const std::array<std::int32_t, 3>& k) const;
@@ -274,7 +310,7 @@ class GraphStorage {
     std::uint32_t newPage(std::uint32_t block);
 
     double blockSize_;
-    std::vector<std::unique_ptr<PageChunk>> chunks_;
+    std::vector<PageChunk> chunks_;  ///< kPagesPerChunk pages each
     std::uint32_t pageCount_ = 0;
     std::vector<PageBounds> bounds_;        ///< of pages
     std::vector<std::uint32_t> freePages_;  ///< a heap, smallest on top: as after loading
