@@ -276,6 +276,7 @@ void Association::claim(const ViewPoints& view, float targetResolution, const St
         all.best, (std::uint64_t{std::bit_cast<std::uint32_t>(claim.distance)} << 32U) | pixel);
     const bool fine = view.spacing(pixel) <= targetResolution;
     all.flags |= view.kinds[pixel] == 0 ? kSomeSurrounded : kSomeOpen;
+    all.flags |= static_cast<std::uint32_t>(view.kinds[pixel]) << kKindsShift;
     all.flags |= fine ? unsigned{kSomeFine} : 0U;
     all.area += static_cast<std::uint32_t>(view.area[pixel] / kAreaUnit);
 }

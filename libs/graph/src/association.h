@@ -39,6 +39,7 @@ class Association {
         kSomeSurrounded = 1,  ///< one had all four neighbours valid and near
         kSomeOpen = 2,        ///< one had not
         kSomeFine = 4,        ///< one samples as densely as asked for
+        kKindsShift = 3,      ///< above: OpenKind bits of all of them
     };
 
     /// Culls blocks and pages against the frustum and projects what is left, eq. (4).

@@ -175,13 +175,13 @@ void Merger::update(Page& page, std::uint32_t slot, std::uint32_t candidate, flo
     const auto pixel = static_cast<std::uint32_t>(claims.best);
     std::uint8_t& state = page.state[slot];
     state = static_cast<std::uint8_t>(
-        state | ((claims.flags & Association::kSomeSurrounded) != 0 ? kSurrounded : 0) |
+        state | ((claims.flags & Association::kSomeOpen) == 0 ? kSurrounded : 0) |
         ((claims.flags & Association::kSomeFine) != 0 ? kFineEnough : 0));
     const unsigned evidence = evidenceOf(state);
     state = withEvidence(state, evidence > 0 ? evidence - 1 : 0);
     // Reasons that both views give are better than those of one; else the newer view knows.
     const unsigned before = page.open[slot] & ~unsigned{kTooCoarse};
-    const unsigned now = points_.kinds[pixel];
+    const unsigned now = claims.flags >> Association::kKindsShift;
     const std::uint8_t open =
         openBits(static_cast<std::uint8_t>((before & now) != 0 ? before & now : now), state, sigma);
     work.touched = work.touched || open != 0 || page.open[slot] != 0;
@@ -249,6 +249,10 @@ void Merger::passOver(Page& page, std::uint32_t slot, std::uint32_t candidate, P
     if (!(std::abs(depth - seen.z) <= near)) {
         return;
     }
+    // The surface goes on around it in this view, whichever vertex its pixels chose.
+    page.state[slot] = static_cast<std::uint8_t>(
+        page.state[slot] | (points_.kinds[i] == 0 ? kSurrounded : 0) |
+        (points_.spacing(i) <= static_cast<float>(options_.targetResolution) ? kFineEnough : 0));
     fuseAlongRay(page, slot, seen, depth, points_.sigma[i], work);
     if (frontal(i) && points_.kinds[i] == 0 && page.area[slot] != 0) {
         // The pixels around stand for this vertex' share of the surface already.
