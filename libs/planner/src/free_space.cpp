@@ -17,6 +17,9 @@ namespace {
 
 constexpr float kFar = std::numeric_limits<float>::infinity();
 constexpr std::uint32_t kNoParent = 0xFFFFFFFFU;
+const std::array<Eigen::Vector3i, 6> kFaces = {Eigen::Vector3i(1, 0, 0), Eigen::Vector3i(-1, 0, 0),
+                                               Eigen::Vector3i(0, 1, 0), Eigen::Vector3i(0, -1, 0),
+                                               Eigen::Vector3i(0, 0, 1), Eigen::Vector3i(0, 0, -1)};
 
 /// Depths of a view for questions about rectangles: least depth and share of measured pixels.
 class DepthRectangles {
@@ -283,7 +286,7 @@ void FreeSpace::noteTry(const Eigen::Vector3d& point) {
     }
 }
 
-void FreeSpace::markClear(double clearance, const Eigen::AlignedBox3d& limits) {
+void FreeSpace::updateClear(double clearance, const Eigen::AlignedBox3d& limits) {
     clear_.assign(voxels_.size(), 0);
     std::size_t at = 0;
     for (int z = 0; z < size_.z(); ++z) {
@@ -296,17 +299,15 @@ void FreeSpace::markClear(double clearance, const Eigen::AlignedBox3d& limits) {
     // The surface may lie anywhere in a voxel that is not free, and the way between two centres
     // dips below the clearance of both: one voxel more covers the two.
     const std::vector<Eigen::Vector3i> offsets = ball(clearance / voxel_ + 1.0);
-    const std::array<Eigen::Vector3i, 6> faces = {
-        Eigen::Vector3i::UnitX(),  -Eigen::Vector3i::UnitX(), Eigen::Vector3i::UnitY(),
-        -Eigen::Vector3i::UnitY(), Eigen::Vector3i::UnitZ(),  -Eigen::Vector3i::UnitZ()};
     for (std::size_t i = 0; i < voxels_.size(); ++i) {
         if (passable(voxels_[i])) {
             continue;
         }
         const Eigen::Vector3i v = coordinates(i);
-        const bool border = std::any_of(faces.begin(), faces.end(), [&](const Eigen::Vector3i& f) {
-            return inside(v + f) && passable(voxels_[index(v + f)]);
-        });
+        const bool border =
+            std::any_of(kFaces.begin(), kFaces.end(), [&](const Eigen::Vector3i& f) {
+                return inside(v + f) && passable(voxels_[index(v + f)]);
+            });
         if (border) {
             for (const Eigen::Vector3i& o : offsets) {
                 if (inside(v + o)) {
@@ -369,10 +370,62 @@ void FreeSpace::searchFrom(const Eigen::Vector3i& start) {
     }
 }
 
-void FreeSpace::updateReach(const Eigen::Vector3d& start, double clearance,
-                            const Eigen::AlignedBox3d& limits) {
+bool FreeSpace::knownAround(const Eigen::Vector3d& point, double radius) const {
+    const Eigen::Vector3i first = voxelOf(point - Eigen::Vector3d::Constant(radius));
+    const Eigen::Vector3i last = voxelOf(point + Eigen::Vector3d::Constant(radius));
+    if (!inside(first) || !inside(last)) {
+        return false;
+    }
+    const auto isSurface = [this](const Eigen::Vector3i& v) {
+        return inside(v) && (voxels_[index(v)] & kSurfaceBit) != 0;
+    };
+    for (int z = first.z(); z <= last.z(); ++z) {
+        for (int y = first.y(); y <= last.y(); ++y) {
+            for (int x = first.x(); x <= last.x(); ++x) {
+                const Eigen::Vector3i v(x, y, z);
+                const Eigen::Vector3d low = origin_ + v.cast<double>() * voxel_;
+                const Eigen::AlignedBox3d box(low, low + Eigen::Vector3d::Constant(voxel_));
+                const std::uint8_t voxel = voxels_[index(v)];
+                if (box.squaredExteriorDistance(point) >= radius * radius ||
+                    (voxel & (kFreeBit | kSurfaceBit)) != 0) {
+                    continue;
+                }
+                const bool cut = (voxel & kKnownBit) != 0 &&
+                                 std::any_of(kFaces.begin(), kFaces.end(),
+                                             [&](const auto& f) { return isSurface(v + f); });
+                if (!cut) {
+                    return false;
+                }
+            }
+        }
+    }
+    return true;
+}
+
+std::optional<Eigen::Vector3d> FreeSpace::nearestClear(const Eigen::Vector3d& point, int reach,
+                                                       bool reached) const {
+    const Eigen::Vector3i v = voxelOf(point);
+    std::optional<Eigen::Vector3d> nearest;
+    for (int z = -reach; z <= reach; ++z) {
+        for (int y = -reach; y <= reach; ++y) {
+            for (int x = -reach; x <= reach; ++x) {
+                const Eigen::Vector3i w = v + Eigen::Vector3i(x, y, z);
+                if (!inside(w) || clear_[index(w)] == 0 ||
+                    (reached && !std::isfinite(distance_[index(w)]))) {
+                    continue;
+                }
+                const Eigen::Vector3d c = centre(w);
+                if (!nearest || (c - point).squaredNorm() < (*nearest - point).squaredNorm()) {
+                    nearest = c;
+                }
+            }
+        }
+    }
+    return nearest;
+}
+
+void FreeSpace::updateReach(const Eigen::Vector3d& start) {
     start_ = start;
-    markClear(clearance, limits);
     const Eigen::Vector3i v = voxelOf(start);
     if (!inside(v)) {
         throw std::invalid_argument("free space: the camera is outside of the workspace");

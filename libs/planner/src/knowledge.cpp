@@ -21,6 +21,8 @@ std::optional<Eigen::AlignedBox3d> toBox(const std::vector<double>& v) {
                                Eigen::Vector3d(v[3], v[4], v[5]));
 }
 
+constexpr int kBeside = 2;  // [voxels] that the camera may go beyond those that are clear
+
 double cellSizeOf(const PlannerOptions& options, const PixelGraph& graph) {
     return options.cellSize > 0 ? options.cellSize : 4 * graph.options().targetResolution;
 }
@@ -120,8 +122,47 @@ void Knowledge::update(const View& view) {
 }
 
 void Knowledge::updateReach() {
-    space_.updateReach(camera_.translation, limits_.clearance + options_.clearanceMargin,
-                       cameraBox_);
+    space_.updateClear(clearance(), cameraBox_);
+    anchor_ = camera_.translation;
+    if (!space_.isClear(anchor_)) {
+        // Between voxels, where placeAt() let it go: ways begin at the clear one beside it.
+        const auto beside = space_.nearestClear(anchor_, kBeside, false);
+        if (beside && fits(anchor_, *beside)) {
+            anchor_ = *beside;
+        }
+    }
+    space_.updateReach(anchor_);
+}
+
+/// True if the camera keeps its clearance on the straight way, by the surface itself.
+bool Knowledge::fits(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const {
+    constexpr double kStep = 0.03;  // [m] the way dips below the clearance by less than 1 mm
+    const int n = std::max(1, static_cast<int>(std::ceil((to - from).norm() / kStep)));
+    const auto radius = static_cast<float>(clearance());
+    for (int i = 0; i <= n; ++i) {
+        const Eigen::Vector3d p = from + (to - from) * (static_cast<double>(i) / n);
+        if (!cameraBox_.contains(p) || !space_.knownAround(p, clearance()) ||
+            graph_->nearest(p.cast<float>(), radius)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+std::optional<Knowledge::Place> Knowledge::placeAt(const Eigen::Vector3d& eye) const {
+    const double detour = (anchor_ - camera_.translation).norm();
+    if (space_.snap(eye) == space_.snap(camera_.translation)) {
+        return Place{camera_.translation, 0.0};
+    }
+    const double path = space_.distanceTo(eye);
+    if (std::isfinite(path)) {
+        return Place{space_.snap(eye), detour + path};
+    }
+    const auto beside = space_.nearestClear(eye, kBeside, true);
+    if (!beside || !fits(*beside, eye)) {
+        return std::nullopt;
+    }
+    return Place{eye, detour + space_.distanceTo(*beside) + (eye - *beside).norm()};
 }
 
 bool Knowledge::tiltAllowed(const Pose& pose) const {
@@ -130,9 +171,18 @@ bool Knowledge::tiltAllowed(const Pose& pose) const {
 }
 
 std::vector<Pose> Knowledge::pathTo(const Pose& goal) const {
-    const std::vector<Eigen::Vector3d> corners = space_.pathTo(goal.translation);
-    if (corners.empty()) {
+    const bool clear = std::isfinite(space_.distanceTo(goal.translation));
+    const auto beside = clear ? std::optional(goal.translation)
+                              : space_.nearestClear(goal.translation, kBeside, true);
+    if (!beside) {
         return {};
+    }
+    std::vector<Eigen::Vector3d> corners = space_.pathTo(*beside);
+    if (anchor_ != camera_.translation) {
+        corners.insert(corners.begin(), camera_.translation);
+    }
+    if (!clear) {
+        corners.push_back(goal.translation);
     }
     double length = 0;
     for (std::size_t i = 1; i < corners.size(); ++i) {

@@ -1,19 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "riftmap/planner/paper_view_planner.h"
 
-#include <cmath>
-
 namespace riftmap {
 
 std::optional<ViewPlan> PaperViewPlanner::nextOfQueue(const Knowledge& knowledge) {
     while (!queue_.empty()) {
         Pose pose = queue_.front();
         queue_.pop_front();
-        if (!std::isfinite(knowledge.space().distanceTo(pose.translation)) ||
-            !knowledge.tiltAllowed(pose)) {
+        const auto place = knowledge.placeAt(pose.translation);
+        if (!place || !knowledge.tiltAllowed(pose)) {
             continue;
         }
-        pose.translation = knowledge.space().snap(pose.translation);
+        pose.translation = place->eye;
         ViewPlan plan;
         plan.path = knowledge.pathTo(pose);
         if (!plan.path.empty()) {

@@ -128,8 +128,13 @@ bool RiftLedger::tried(const RiftRecord& record, const Eigen::Vector3d& eye) {
     const float distance = ray.norm();
     return std::any_of(record.attempts.begin(), record.attempts.end(), [&](const Attempt& a) {
         constexpr float kCosSame = 0.92F;  // 23 degrees
-        return ray.dot(a.direction) > kCosSame * distance && distance > 0.7F * a.distance &&
-               distance < 1.4F * a.distance;
+        constexpr float kOver = 0.1F;
+        // Farther over a silhouette the eye sees what it could not see before.
+        const bool farther = (record.cell.kinds & kDepthStep) != 0 &&
+                             ray.dot(record.cell.outward) >
+                                 (a.direction.dot(record.cell.outward) + kOver) * distance;
+        return !farther && ray.dot(a.direction) > kCosSame * distance &&
+               distance > 0.7F * a.distance && distance < 1.4F * a.distance;
     });
 }
 

@@ -69,14 +69,13 @@ class Choice {
 
 /// Adds the view if the camera can get there. The place is moved to the middle of its voxel.
 bool Choice::add(const Eigen::Vector3d& eye, const Eigen::Vector3d& target) {
-    const double path = k_.space().distanceTo(eye);
-    const Eigen::Vector3d place = path == 0.0 ? k_.camera().translation : k_.space().snap(eye);
-    if (!std::isfinite(path) || (target - place).norm() < 1e-6) {
+    const auto place = k_.placeAt(eye);
+    if (!place || (target - place->eye).norm() < 1e-6) {
         return false;
     }
     Candidate c;
-    c.pose = k_.sensor().lookingAt(place, target);
-    c.path = path;
+    c.pose = k_.sensor().lookingAt(place->eye, target);
+    c.path = place->path;
     if (!k_.tiltAllowed(c.pose)) {
         return false;
     }
@@ -88,7 +87,7 @@ bool Choice::add(const Eigen::Vector3d& eye, const Eigen::Vector3d& target) {
 /// from where one view still measures well.
 void Choice::addAround(const RiftRecord& record, int directions) {
     const Eigen::Vector3d p = record.cell.openPosition.cast<double>();
-    Eigen::Vector3d n = record.cell.normal.cast<double>();
+    Eigen::Vector3d n = record.cell.openNormal.cast<double>();
     if (n.norm() < 0.5) {
         n = (k_.camera().translation - p).normalized();
     }
@@ -97,7 +96,10 @@ void Choice::addAround(const RiftRecord& record, int directions) {
     t = rim ? t.normalized() : anyPerpendicular(n);
     const Eigen::Vector3d side = n.cross(t).normalized();
     const double turn = uniform(0, 2 * kPi);
-    std::vector<Eigen::Vector3d> ways = {n, n + 0.7 * t, 0.35 * n + t, n - 0.7 * t};
+    std::vector<Eigen::Vector3d> ways = {n, n + 0.7 * t, 0.35 * n + t, n + 1.4 * t};
+    if (!rim) {
+        ways.back() = n - 0.7 * t;
+    }
     ways.push_back(n + 0.8 * (std::cos(turn) * t + std::sin(turn) * side));
     for (int i = 5; i < directions; ++i) {
         const double angle = turn + 2.4 * i;
@@ -179,10 +181,12 @@ void Choice::addPlaces() {
 /// Good views of the plans before, that were not taken.
 void Choice::addPool() {
     for (const Pose& pose : pool_) {
-        Candidate c;
-        c.pose = pose;
-        c.path = k_.space().distanceTo(pose.translation);
-        if (std::isfinite(c.path) && c.path > 0) {
+        const auto place = k_.placeAt(pose.translation);
+        if (place && place->path > 0) {
+            Candidate c;
+            c.pose = pose;
+            c.pose.translation = place->eye;
+            c.path = place->path;
             candidates_.push_back(std::move(c));
         }
     }
@@ -218,12 +222,14 @@ void Choice::refine(const Candidate& best) {
         const bool stay = best.path == 0.0 || i % 3 == 0;
         const Eigen::Vector3d eye =
             stay ? pose.translation : Eigen::Vector3d(pose.translation + reach * shift);
+        const auto place = k_.placeAt(eye);
+        if (!place) {
+            continue;
+        }
         Candidate c;
-        c.path = k_.space().distanceTo(eye);
-        const Eigen::Vector3d place =
-            c.path == 0.0 ? k_.camera().translation : k_.space().snap(eye);
-        c.pose = lookAt(place, place + axis + turn);
-        if (std::isfinite(c.path) && k_.tiltAllowed(c.pose)) {
+        c.path = place->path;
+        c.pose = lookAt(place->eye, place->eye + axis + turn);
+        if (k_.tiltAllowed(c.pose)) {
             candidates_.push_back(std::move(c));
         }
     }

@@ -30,17 +30,19 @@ Eigen::Vector3i unpack(std::uint64_t key) {
 struct Sums {
     Eigen::Vector3d position = Eigen::Vector3d::Zero(), normal = Eigen::Vector3d::Zero();
     Eigen::Vector3d openPosition = Eigen::Vector3d::Zero(), outward = Eigen::Vector3d::Zero();
+    Eigen::Vector3d tornNormal = Eigen::Vector3d::Zero(), coarseNormal = Eigen::Vector3d::Zero();
+    double jump = 0;
     std::uint32_t vertices = 0, torn = 0, coarse = 0, open = 0, high = 0;
     std::uint8_t kinds = 0;
 };
 
 /// From the neighbours towards the vertex and on: out of the surface seen so far.
-Eigen::Vector3d outwardAt(const PixelGraph& graph, VertexId id, const Vertex& v,
-                          std::uint32_t& high) {
+Eigen::Vector3d outwardAt(const PixelGraph& graph, VertexId id, const Vertex& v, Sums& sums) {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    graph.forEachEdge(id, [&](VertexId to, float weight) {
-        if (graph.isHigh(id, to, weight)) {
-            ++high;
+    graph.forEachEdge(id, [&](VertexId to, float weight, bool high) {
+        if (high) {
+            ++sums.high;
+            sums.jump += static_cast<double>(weight);
         } else {
             sum += (v.position - graph.position(to)).cast<double>().normalized();
         }
@@ -66,6 +68,11 @@ SurfaceCell toCell(const Sums& s, std::uint64_t key, double cell) {
     const double spacing = cell / std::sqrt(static_cast<double>(s.vertices));
     if (s.open > 0) {
         c.openPosition = (s.openPosition / s.open).cast<float>();
+        const Eigen::Vector3d& normal = s.torn > 0 ? s.tornNormal : s.coarseNormal;
+        if (normal.norm() > 1e-6) {
+            c.openNormal = normal.normalized().cast<float>();
+        }
+        c.jump = s.high > 0 ? static_cast<float>(s.jump / s.high) : 0.0F;
         c.rim = static_cast<float>(std::min(s.torn * spacing, 2.0 * cell));
         c.coarse = static_cast<float>(cell * cell * s.coarse / s.vertices);
     }
@@ -194,9 +201,11 @@ SurfaceSummary::Block SurfaceSummary::build(const PixelGraph& graph, std::uint64
         s.openPosition += p;
         if ((v.open & ~kTooCoarse) != 0) {
             ++s.torn;
-            s.outward += outwardAt(graph, id, v, s.high);
+            s.outward += outwardAt(graph, id, v, s);
+            s.tornNormal += v.normal.cast<double>();
         } else {
             ++s.coarse;
+            s.coarseNormal += v.normal.cast<double>();
         }
     });
     Block block;

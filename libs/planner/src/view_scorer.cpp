@@ -66,11 +66,12 @@ ViewScorer::Benefit ViewScorer::benefit(const RiftRecord& record,
     }
     const Eigen::Vector3d ray = eye - record.cell.openPosition.cast<double>();
     const double distance = ray.norm();
-    const Eigen::Vector3d n = record.cell.normal.cast<double>();
-    // At a silhouette the surface bends away over the rim: what is to be seen faces outwards too.
-    Eigen::Vector3d facing = n;
+    // At a silhouette the surface bends away over the rim: what is to be seen faces outwards too,
+    // the more so if views from where the rim's own surface is seen well were in vain.
+    Eigen::Vector3d facing = record.cell.openNormal.cast<double>();
     if ((record.cell.kinds & kDepthStep) != 0) {
-        facing = n + 0.7 * record.cell.outward.cast<double>();
+        const double over = 0.7 * (1.0 + static_cast<double>(record.attempts.size()));
+        facing += over * record.cell.outward.cast<double>();
     }
     double angle = 0.6;  // where no normal is known, any side may do
     if (facing.norm() > 1e-3) {
@@ -82,9 +83,12 @@ ViewScorer::Benefit ViewScorer::benefit(const RiftRecord& record,
     const double afar = kNewSurfaceDepth * goodDepth_;
     const double torn = distance <= afar ? 1.0 : std::pow(afar / distance, 2);
     const double coarse = std::clamp((1.6 * goodDepth_ - distance) / (0.6 * goodDepth_), 0.0, 1.0);
-    const double vain = std::pow(0.6, record.attempts.size());
+    const double vain = std::pow(0.8, record.attempts.size());
     const double cell = summary_->cellSize();
-    const double tornArea = static_cast<double>(record.cell.rim) * weights_.reach * cell;
+    // What a step hides is about as wide as the step is deep.
+    const double reach = std::clamp(0.5 * static_cast<double>(record.cell.jump),
+                                    weights_.reach * cell, weights_.farthestReach * cell);
+    const double tornArea = static_cast<double>(record.cell.rim) * reach;
     const double coarseArea = weights_.coarse * static_cast<double>(record.cell.coarse);
     Benefit result;
     result.area = angleQuality * vain * (torn * tornArea + coarse * coarseArea);
@@ -206,7 +210,7 @@ ViewScore ViewScorer::score(const Pose& world_T_camera) const {
                 continue;
             }
             result.openGain += b.area;
-            if (b.quality > 0.25) {
+            if (b.quality > 0.5) {
                 result.cells.push_back(record.cell.key);
             }
         }

@@ -53,7 +53,8 @@ TEST(FreeSpace, pixelsWithoutAMatchAreKnownOnlyWhereTheBackgroundIsFree) {
     open.carve(view, sensorOf(view), true);
     EXPECT_EQ(open.at({1.5, 0, 0}), State::kFree);
     // Known, but not proven free to fly through.
-    open.updateReach({0, 0, 0}, 0.0, kBox);
+    open.updateClear(0.0, kBox);
+    open.updateReach({0, 0, 0});
     EXPECT_TRUE(std::isinf(open.distanceTo({1.5, 0, 0})));
 }
 
@@ -63,7 +64,8 @@ TEST(FreeSpace, waysKeepTheClearance) {
         Eigen::AlignedBox3d(Eigen::Vector3d(1, -0.5, -2), Eigen::Vector3d(2, 2, 2)));
     const Eigen::Vector3d start(0, 1, 0);
     const Eigen::Vector3d goal(3, 1, 0);
-    space.updateReach(start, 0.3, kBox);
+    space.updateClear(0.3, kBox);
+    space.updateReach(start);
     ASSERT_TRUE(std::isfinite(space.distanceTo(goal)));
     EXPECT_TRUE(std::isinf(space.distanceTo({1.5, 1, 0})));
     EXPECT_TRUE(std::isinf(space.distanceTo({0.9, 1, 0})));  // nearer than the clearance

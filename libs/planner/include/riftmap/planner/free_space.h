@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "riftmap/core/view.h"
@@ -52,10 +53,23 @@ class FreeSpace {
     void noteTry(const Eigen::Vector3d& point);
     static constexpr std::uint8_t kTries = 2;
 
-    /// Finds where a ball of radius `clearance` can go from `start` inside `limits`, straight from
-    /// voxel centre to voxel centre, and how far that is. To be called again after changes.
-    void updateReach(const Eigen::Vector3d& start, double clearance,
-                     const Eigen::AlignedBox3d& limits);
+    /// Finds the voxels at whose centres a ball of radius `clearance` fits inside `limits`, with
+    /// what the way between two of them needs. To be called again after changes.
+    void updateClear(double clearance, const Eigen::AlignedBox3d& limits);
+    /// After updateClear(): which of those can be reached from `start`, straight from voxel centre
+    /// to voxel centre, and how far that is. The start's own voxel counts as clear.
+    void updateReach(const Eigen::Vector3d& start);
+    bool isClear(const Eigen::Vector3d& point) const {
+        const Eigen::Vector3i v = voxelOf(point);
+        return inside(v) && clear_[index(v)] != 0;
+    }
+    /// True if all that lies nearer than `radius` to this place was seen through, or is surface
+    /// or cut by surface: then only the surface that is known has to be kept away from.
+    bool knownAround(const Eigen::Vector3d& point, double radius) const;
+    /// Centre of the nearest voxel, at most `reach` voxels away along each axis, that is clear (or
+    /// with `reached` can be reached as well); nothing if there is none.
+    std::optional<Eigen::Vector3d> nearestClear(const Eigen::Vector3d& point, int reach,
+                                                bool reached) const;
     /// Length of the way to the voxel of this place [m]; infinite if it is not reachable.
     double distanceTo(const Eigen::Vector3d& point) const;
     /// Centre of the voxel that holds this place.
@@ -92,7 +106,6 @@ class FreeSpace {
     bool passable(std::uint8_t voxel) const {
         return (voxel & kFreeBit) != 0 && (voxel & kSurfaceBit) == 0;
     }
-    void markClear(double clearance, const Eigen::AlignedBox3d& limits);
     void searchFrom(const Eigen::Vector3i& start);
 
     Eigen::AlignedBox3d box_;

@@ -22,10 +22,14 @@ struct SurfaceCell {
     std::uint32_t highEdges = 0;  ///< at the open vertices, each counted at both ends
     std::uint8_t kinds = 0;       ///< OpenKind bits of those
     Eigen::Vector3f openPosition = Eigen::Vector3f::Zero();  ///< mean of the open vertices
+    /// Mean of the normals at the tear (of the open vertices that are torn, else of all open
+    /// ones), unit or zero: at an edge of a solid the face that ends there, not both.
+    Eigen::Vector3f openNormal = Eigen::Vector3f::Zero();
     /// Over the rim: from the neighbours of the open vertices towards where none are; in the
     /// surface, length at most 1 (short where the tear runs around).
     Eigen::Vector3f outward = Eigen::Vector3f::Zero();
     float rim = 0;     ///< length of the tear in this cell, about [m]
+    float jump = 0;    ///< mean length of the high edges across it [m]; 0 where none is left
     float coarse = 0;  ///< area sampled too sparsely or known too badly, about [m^2]
 };
 

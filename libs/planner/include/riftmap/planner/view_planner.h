@@ -25,10 +25,10 @@ namespace riftmap {
 struct PlannerOptions {
     double cellSize = 0;    ///< of the surface summary [m]; 0 = 4 target resolutions
     double voxelSize = 0;   ///< of the free space [m]; 0 = by the workspace
-    double viewCost = 1.0;  ///< what taking a view costs, in metres of path
+    double viewCost = 4.0;  ///< what taking a view costs, in metres of path
     double minGain =
         5e-4;             ///< a view that adds less than this share of the surface is not worth it
-    int maxAttempts = 3;  ///< views of a tear that may fail before it counts as unobservable
+    int maxAttempts = 4;  ///< views of a tear that may fail before it counts as unobservable
     double unknownWeight = 0.5;     ///< of unknown space looked into, against tears to be closed
     double clearanceMargin = 0.02;  ///< beyond the platform's clearance [m]
     int targets = 48;               ///< tears that candidates are made for, in one plan
@@ -51,10 +51,20 @@ class Knowledge {
     void update(const View& view);
     /// Ways from where the camera is.
     void updateReach();
+    /// A place where the camera fits, and the way there.
+    struct Place {
+        Eigen::Vector3d eye;
+        double path = 0;  ///< length of the way there [m]
+    };
+    /// The place itself if it is where the camera is, or lies between voxels but nearer to the
+    /// surface than their centres may; else the middle of its voxel. Nothing if it is not known to
+    /// be reachable. Thread-safe while nothing changes.
+    std::optional<Place> placeAt(const Eigen::Vector3d& eye) const;
 
     const PixelGraph& graph() const { return *graph_; }
     const PlatformLimits& limits() const { return limits_; }
     const PlannerOptions& options() const { return options_; }
+    double clearance() const { return limits_.clearance + options_.clearanceMargin; }
     const SensorModel& sensor() const { return sensor_; }
     const SurfaceSummary& summary() const { return summary_; }
     const FreeSpace& space() const { return space_; }
@@ -73,6 +83,8 @@ class Knowledge {
     std::vector<Pose> pathTo(const Pose& goal) const;
 
  private:
+    bool fits(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const;
+
     const PixelGraph* graph_;
     PlatformLimits limits_;
     PlannerOptions options_;
@@ -83,6 +95,7 @@ class Knowledge {
     FreeSpace space_;
     RiftLedger ledger_;
     Pose camera_;
+    Eigen::Vector3d anchor_ = Eigen::Vector3d::Zero();  ///< where ways over voxels begin
     std::size_t views_ = 0;
 };
 

@@ -28,8 +28,9 @@ class ViewScorer {
  public:
     struct Weights {
         double unknown = 1.0;  ///< of unknown area against that at tears
-        double reach = 2.0;    ///< width of the strip that closing a tear brings, in cells
-        double coarse = 0.35;  ///< of surface known better against surface known at all
+        double reach = 1.5;    ///< width of the strip that closing a tear brings, in cells ...
+        double farthestReach = 4.0;  ///< ... and beyond deep steps at most
+        double coarse = 0.35;        ///< of surface known better against surface known at all
     };
 
     /// Everything must outlive the scorer and stay as it is.
