@@ -159,7 +159,7 @@ Eigen::Vector3d FreeSpace::snap(const Eigen::Vector3d& point) const {
 void FreeSpace::declareFreeOutside(const Eigen::AlignedBox3d& surfaces) {
     for (std::size_t i = 0; i < voxels_.size(); ++i) {
         if (surfaces.exteriorDistance(centre(coordinates(i))) > 0.5 * voxel_) {
-            voxels_[i] |= kFreeBit | kKnownBit;
+            voxels_[i] |= kFreeBit | kKnownBit | kSeenBit;
         }
     }
 }
@@ -213,6 +213,9 @@ void FreeSpace::carve(const View& view, const SensorModel& sensor, bool backgrou
                         if ((measured || backgroundIsFree) &&
                             p.z() < static_cast<double>(at) + 0.5 * voxel_) {
                             voxels_[i] |= kKnownBit;
+                            if (p.z() < static_cast<double>(at)) {
+                                voxels_[i] |= kSeenBit;
+                            }
                         }
                         // Near the camera few voxels are in the image as a whole. Of one whose
                         // middle is, what sticks out borders on a voxel that is not free, and keeps
@@ -277,6 +280,45 @@ FreeSpace::UnknownRun FreeSpace::firstUnknown(const Eigen::Vector3d& origin,
         run.end = s;
     }
     return run;
+}
+
+std::vector<FreeSpace::Frontier> FreeSpace::frontier(const Eigen::AlignedBox3d& within) const {
+    const auto looks = [&](const Eigen::Vector3i& v) {
+        const std::uint8_t voxel = voxels_[index(v)];
+        return (voxel & kSurfaceBit) == 0 && (voxel & kSeenBit) != 0;
+    };
+    const Eigen::Vector3i first = voxelOf(within.min()).cwiseMax(0);
+    const Eigen::Vector3i last = voxelOf(within.max()).cwiseMin(size_ - Eigen::Vector3i::Ones());
+    std::vector<Frontier> found;
+    for (int z = first.z(); z <= last.z(); ++z) {
+        for (int y = first.y(); y <= last.y(); ++y) {
+            for (int x = first.x(); x <= last.x(); ++x) {
+                const Eigen::Vector3i v(x, y, z);
+                const std::uint8_t voxel = voxels_[index(v)];
+                if ((voxel & (kFreeBit | kKnownBit | kSurfaceBit)) != 0 ||
+                    (voxel >> kTryShift) >= kTries || !within.contains(centre(v))) {
+                    continue;
+                }
+                Eigen::Vector3i out = Eigen::Vector3i::Zero();
+                int faces = 0;
+                for (int axis = 0; axis < 3; ++axis) {
+                    for (const int side : {-1, 1}) {
+                        Eigen::Vector3i w = v;
+                        w[axis] += side;
+                        if (inside(w) && looks(w)) {
+                            out[axis] += side;
+                            ++faces;
+                        }
+                    }
+                }
+                if (faces > 0) {
+                    const auto face = static_cast<float>(voxel_ * voxel_);
+                    found.push_back({centre(v).cast<float>(), face * out.cast<float>()});
+                }
+            }
+        }
+    }
+    return found;
 }
 
 void FreeSpace::noteTry(const Eigen::Vector3d& point) {

@@ -56,6 +56,16 @@ double voxelSizeOf(const PlannerOptions& options, const Eigen::AlignedBox3d& box
     return std::max(std::cbrt(box.volume() / kVoxels), std::max(0.03, 0.35 * clearance));
 }
 
+/// Fine enough that what is left of the box shows the object's shape.
+FreeSpace hullOf(const Eigen::AlignedBox3d& surfaces, double cell) {
+    constexpr double kVoxels = 1e5;
+    const double voxel = std::max(std::cbrt(surfaces.volume() / kVoxels), 1.25 * cell);
+    const Eigen::Vector3d margin = Eigen::Vector3d::Constant(1.5 * voxel);
+    FreeSpace hull(Eigen::AlignedBox3d(surfaces.min() - margin, surfaces.max() + margin), voxel);
+    hull.declareFreeOutside(surfaces);
+    return hull;
+}
+
 }  // namespace
 
 void PlannerOptions::describe(OptionTable& table) {
@@ -97,6 +107,7 @@ Knowledge::Knowledge(const PixelGraph& graph, const PlatformLimits& limits,
       ledger_(graph.options().targetResolution, options.maxAttempts) {
     if (surfaceBox_) {
         space_.declareFreeOutside(*surfaceBox_);
+        hull_ = hullOf(*surfaceBox_, summary_.cellSize());
     }
 }
 
@@ -119,6 +130,10 @@ void Knowledge::update(const View& view) {
         }
     }
     space_.setSurface(surface);
+    if (hull_) {
+        hull_->carve(view, sensor_, options_.backgroundIsFree);
+        hull_->setSurface(surface);
+    }
 }
 
 void Knowledge::updateReach() {

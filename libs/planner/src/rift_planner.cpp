@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 
-#include "riftmap/planner/view_planner.h"
+#include "view_choice.h"
 
 namespace riftmap {
 
@@ -15,12 +15,20 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
-struct Candidate {
-    Pose pose;
-    double path = 0;  ///< [m]
-    ViewScore score;
-    double utility = 0;  ///< gain for a metre
-};
+ViewScorer::Weights weightsFor(const Knowledge& k) {
+    ViewScorer::Weights weights;
+    weights.unknown = k.options().unknownWeight;
+    if (k.surfaceBox()) {
+        // Unseen surface counts where it may be (the frontier), so the rims of the surface seen
+        // stand for holes that are smaller than that, and coarse surface is mostly covered. Both
+        // so that gains come true: predicted against measured on four objects.
+        weights.reach = 0.4;
+        weights.coarse = 0.15;
+    }
+    return weights;
+}
+
+}  // namespace
 
 Eigen::Vector3d anyPerpendicular(const Eigen::Vector3d& n) {
     const Eigen::Vector3d axis =
@@ -28,44 +36,12 @@ Eigen::Vector3d anyPerpendicular(const Eigen::Vector3d& n) {
     return n.cross(axis).normalized();
 }
 
-/// One plan: makes candidates, scores them, picks.
-class Choice {
- public:
-    Choice(Knowledge& knowledge, std::vector<Pose>& pool)
-        : k_(knowledge),
-          pool_(pool),
-          scorer_(k_.sensor(), k_.summary(), k_.ledger(), k_.space(), k_.resolution(),
-                  ViewScorer::Weights{k_.options().unknownWeight}),
-          random_(k_.options().seed * 1000003U + k_.views()),
-          good_(k_.sensor().goodDepth(k_.resolution())) {}
-
-    std::optional<ViewPlan> make();
-
- private:
-    double uniform(double a, double b) {
-        return a + (b - a) * static_cast<double>(random_()) / 4294967296.0;
-    }
-    bool add(const Eigen::Vector3d& eye, const Eigen::Vector3d& target);
-    void addAround(const RiftRecord& record, int directions);
-    void thinOut();
-    void addTurns();
-    void addPlaces();
-    void addPool();
-    void keepPool();
-    void refine(const Candidate& best);
-    void scoreFrom(std::size_t first);
-    const Candidate* best() const;
-    std::optional<ViewPlan> planFor(const Candidate& candidate) const;
-    std::optional<ViewPlan> lastResorts(double minGain);
-    bool lineOfSight(const Eigen::Vector3d& eye, const Eigen::Vector3d& target) const;
-
-    Knowledge& k_;
-    std::vector<Pose>& pool_;
-    ViewScorer scorer_;
-    std::mt19937 random_;
-    double good_;
-    std::vector<Candidate> candidates_;
-};
+Choice::Choice(Knowledge& knowledge, std::vector<Pose>& pool)
+    : k_(knowledge),
+      pool_(pool),
+      scorer_(k_.sensor(), k_.summary(), k_.ledger(), k_.space(), k_.resolution(), weightsFor(k_)),
+      random_(k_.options().seed * 1000003U + k_.views()),
+      good_(k_.sensor().goodDepth(k_.resolution())) {}
 
 /// Adds the view if the camera can get there. The place is moved to the middle of its voxel.
 bool Choice::add(const Eigen::Vector3d& eye, const Eigen::Vector3d& target) {
@@ -146,22 +122,6 @@ void Choice::addTurns() {
 }
 
 void Choice::addPlaces() {
-    const auto& box = k_.surfaceBox();
-    if (box) {
-        // Around an object: from all sides, at distances from which much of it is in view.
-        const double radius = box->diagonal().norm() / 2;
-        for (int i = 0; i < 2 * k_.options().places; ++i) {
-            const double z = uniform(-1, 1);
-            const double a = uniform(0, 2 * kPi);
-            const double r = std::sqrt(1 - z * z);
-            const double distance =
-                uniform(0.9, 1.3) * std::max(radius, k_.sensor().nearLimit) + uniform(0.0, 0.5);
-            add(box->center() + distance * Eigen::Vector3d(r * std::cos(a), r * std::sin(a), z),
-                box->center() + 0.15 * box->sizes().cwiseProduct(Eigen::Vector3d(
-                                           uniform(-1, 1), uniform(-1, 1), uniform(-1, 1))));
-        }
-        return;
-    }
     const std::vector<Eigen::Vector3d> all = k_.space().reachable(2);
     if (all.empty()) {
         return;
@@ -236,17 +196,17 @@ void Choice::refine(const Candidate& best) {
 }
 
 void Choice::scoreFrom(std::size_t first) {
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(first, candidates_.size(), 4),
-                      [&](const tbb::blocked_range<std::size_t>& range) {
-                          for (std::size_t i = range.begin(); i < range.end(); ++i) {
-                              Candidate& c = candidates_[i];
-                              c.score = scorer_.score(c.pose);
-                              // What is too near is not measured, and hides what is behind it.
-                              const double gain =
-                                  c.score.gain * std::max(0.0, 1.0 - 2.5 * c.score.nearShare);
-                              c.utility = gain / (k_.options().viewCost + c.path);
-                          }
-                      });
+    tbb::parallel_for(
+        tbb::blocked_range<std::size_t>(first, candidates_.size(), 4),
+        [&](const tbb::blocked_range<std::size_t>& range) {
+            for (std::size_t i = range.begin(); i < range.end(); ++i) {
+                Candidate& c = candidates_[i];
+                c.score = k_.surfaceBox() ? scoreAround(c.pose) : scorer_.score(c.pose);
+                // What is too near is not measured, and hides what is behind it.
+                const double gain = c.score.gain * std::max(0.0, 1.0 - 2.5 * c.score.nearShare);
+                c.utility = gain / (k_.options().viewCost + c.path);
+            }
+        });
 }
 
 const Candidate* Choice::best() const {
@@ -264,7 +224,7 @@ std::optional<ViewPlan> Choice::planFor(const Candidate& c) const {
     plan.path = c.path == 0.0 ? std::vector<Pose>{c.pose} : k_.pathTo(c.pose);
     plan.gain = c.score.gain;
     plan.cells = c.score.cells;
-    plan.unknown = scorer_.unknownSeen(c.pose);
+    plan.unknown = k_.surfaceBox() ? frontierSeen(c.pose) : scorer_.unknownSeen(c.pose);
     if (plan.path.empty()) {
         return std::nullopt;
     }
@@ -297,6 +257,9 @@ std::optional<ViewPlan> Choice::lastResorts(double minGain) {
         }
         candidates_.clear();
         addAround(*record, 20);
+        if (k_.surfaceBox()) {
+            addInSight(*record, 60, 60);
+        }
         const bool reachable = !candidates_.empty();
         const Eigen::Vector3d p = record->cell.openPosition.cast<double>();
         std::erase_if(candidates_, [&](const Candidate& c) {
@@ -335,21 +298,30 @@ std::optional<ViewPlan> Choice::lastResorts(double minGain) {
     return std::nullopt;
 }
 
+double Choice::minGain() const {
+    const double cell = k_.summary().cellSize();
+    return k_.options().minGain * static_cast<double>(k_.summary().cellCount()) * cell * cell;
+}
+
 std::optional<ViewPlan> Choice::make() {
     const auto& open = scorer_.open();
     const auto targets = static_cast<std::size_t>(k_.options().targets);
     const std::size_t stride = std::max<std::size_t>(1, open.size() / targets);
     for (std::size_t i = random_() % stride; i < open.size(); i += stride) {
-        addAround(*open[i], 5);
+        if (k_.surfaceBox()) {
+            addInSight(*open[i], 24, 5);
+        } else {
+            addAround(*open[i], 5);
+        }
     }
     thinOut();
+    if (k_.surfaceBox()) {
+        return makeAround(*k_.surfaceBox());
+    }
     addTurns();
     addPlaces();
     addPool();
     scoreFrom(0);
-    const double cell = k_.summary().cellSize();
-    const double known = static_cast<double>(k_.summary().cellCount()) * cell * cell;
-    const double minGain = k_.options().minGain * known;
     for (int round = 0; round < 2; ++round) {
         if (const Candidate* b = best()) {
             const std::size_t first = candidates_.size();
@@ -359,17 +331,15 @@ std::optional<ViewPlan> Choice::make() {
     }
     keepPool();
     std::erase_if(candidates_, [&](const Candidate& c) {
-        return c.score.gain < minGain || c.score.nearShare > 0.3;
+        return c.score.gain < minGain() || c.score.nearShare > 0.3;
     });
     if (const Candidate* b = best()) {
         if (auto plan = planFor(*b)) {
             return plan;
         }
     }
-    return lastResorts(minGain);
+    return lastResorts(minGain());
 }
-
-}  // namespace
 
 std::optional<ViewPlan> RiftPlanner::next(Knowledge& knowledge) {
     return Choice(knowledge, pool_).make();

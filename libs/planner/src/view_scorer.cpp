@@ -11,6 +11,7 @@ namespace {
 
 constexpr int kPixels = 12;  ///< of the image to one of the depth buffer, along each axis
 constexpr int kRayStride = 2;
+constexpr double kMargin = 6;  ///< [px] a tear at the very border of the image stays torn
 /// Up to how many good depths away new surface counts in full. One view is not accurate enough
 /// there, but covers much; the views after it make it better.
 constexpr double kNewSurfaceDepth = 1.5;
@@ -30,6 +31,22 @@ struct ViewScorer::DepthBuffer {
     float at(int column, int row) const {
         return depth[static_cast<std::size_t>(row) * static_cast<std::size_t>(width) +
                      static_cast<std::size_t>(column)];
+    }
+    /// Draws a square that faces the camera; p in its frame, half the edge in metres.
+    void splat(const Eigen::Vector3f& p, float half) {
+        const float r = fx * half / p.z();
+        const float u = fx * p.x() / p.z() + cx;
+        const float v = fy * p.y() / p.z() + cy;
+        const int c0 = std::max(0, static_cast<int>(std::lround(u - r)));
+        const int c1 = std::min(width - 1, static_cast<int>(std::lround(u + r)));
+        const int r0 = std::max(0, static_cast<int>(std::lround(v - r)));
+        const int r1 = std::min(height - 1, static_cast<int>(std::lround(v + r)));
+        for (int row = r0; row <= r1; ++row) {
+            for (int column = c0; column <= c1; ++column) {
+                float& d = at(column, row);
+                d = std::min(d, p.z());
+            }
+        }
     }
 };
 
@@ -93,6 +110,8 @@ ViewScorer::Benefit ViewScorer::benefit(const RiftRecord& record,
     Benefit result;
     result.area = angleQuality * vain * (torn * tornArea + coarse * coarseArea);
     result.quality = angleQuality * (tornArea > 0.3 * coarseArea ? torn : coarse);
+    result.torn = angleQuality * vain * torn;
+    result.coarse = angleQuality * vain * coarse;
     return result;
 }
 
@@ -129,19 +148,7 @@ ViewScorer::DepthBuffer ViewScorer::draw(const Pose& camera_T_world,
             if (p.z() < 0.05F || p.z() > farLimit) {
                 continue;
             }
-            const float r = b.fx * half / p.z();
-            const float pu = b.fx * p.x() / p.z() + b.cx;
-            const float pv = b.fy * p.y() / p.z() + b.cy;
-            const int c0 = std::max(0, static_cast<int>(std::lround(pu - r)));
-            const int c1 = std::min(b.width - 1, static_cast<int>(std::lround(pu + r)));
-            const int r0 = std::max(0, static_cast<int>(std::lround(pv - r)));
-            const int r1 = std::min(b.height - 1, static_cast<int>(std::lround(pv + r)));
-            for (int row = r0; row <= r1; ++row) {
-                for (int column = c0; column <= c1; ++column) {
-                    float& d = b.at(column, row);
-                    d = std::min(d, p.z());
-                }
-            }
+            b.splat(p, half);
         }
     }
     return b;
@@ -169,11 +176,7 @@ void ViewScorer::forEachUnknown(const Pose& world_T_camera, const DepthBuffer& b
     }
 }
 
-ViewScore ViewScorer::score(const Pose& world_T_camera) const {
-    ViewScore result;
-    const Pose camera_T_world = world_T_camera.inverse();
-    std::vector<const BlockView*> seen;
-    const DepthBuffer buffer = draw(camera_T_world, seen);
+double ViewScorer::nearShareOf(const DepthBuffer& buffer) const {
     const int firstColumn = sensor_.firstColumn / kPixels;
     int nearPixels = 0;
     for (int row = 0; row < buffer.height; ++row) {
@@ -181,32 +184,45 @@ ViewScore ViewScorer::score(const Pose& world_T_camera) const {
             nearPixels += static_cast<double>(buffer.at(column, row)) < sensor_.nearLimit ? 1 : 0;
         }
     }
-    result.nearShare =
-        static_cast<double>(nearPixels) / ((buffer.width - firstColumn) * buffer.height);
+    return static_cast<double>(nearPixels) / ((buffer.width - firstColumn) * buffer.height);
+}
 
+/// Within range, in the true field of view, and nothing drawn more than `slack` before it.
+bool ViewScorer::visible(const DepthBuffer& buffer, const Eigen::Vector3f& inCamera,
+                         float slack) const {
+    const Eigen::Vector3d p = inCamera.cast<double>();
+    if (p.z() < std::max(1.02 * sensor_.nearLimit, 0.05) || p.z() > sensor_.farLimit) {
+        return false;
+    }
+    const StereoCamera& camera = sensor_.camera;
+    const Eigen::Vector2d uv = camera.project(p);
+    if (uv.x() < sensor_.firstColumn + kMargin || uv.x() > camera.width - 1 - kMargin ||
+        uv.y() < kMargin || uv.y() > camera.height - 1 - kMargin) {
+        return false;
+    }
+    const int column = std::clamp(static_cast<int>(uv.x()) / kPixels, 0, buffer.width - 1);
+    const int row = std::clamp(static_cast<int>(uv.y()) / kPixels, 0, buffer.height - 1);
+    return buffer.at(column, row) >= inCamera.z() - slack;
+}
+
+ViewScore ViewScorer::score(const Pose& world_T_camera) const {
+    ViewScore result;
+    const Pose camera_T_world = world_T_camera.inverse();
+    std::vector<const BlockView*> seen;
+    const DepthBuffer buffer = draw(camera_T_world, seen);
+    result.nearShare = nearShareOf(buffer);
     const StereoCamera& camera = sensor_.camera;
     const double cell = summary_->cellSize();
-    constexpr double kMargin = 6;  // [px] a tear at the very border of the image stays torn
     for (const BlockView* block : seen) {
         for (std::size_t i = block->firstOpen; i < block->lastOpen; ++i) {
             const RiftRecord& record = *open_[i];
-            const Eigen::Vector3d world = record.cell.openPosition.cast<double>();
-            const Eigen::Vector3d p = camera_T_world * world;
-            if (p.z() < 1.02 * sensor_.nearLimit || p.z() < 0.05 || p.z() > sensor_.farLimit) {
-                continue;
-            }
-            const Eigen::Vector2d uv = camera.project(p);
-            if (uv.x() < sensor_.firstColumn + kMargin || uv.x() > camera.width - 1 - kMargin ||
-                uv.y() < kMargin || uv.y() > camera.height - 1 - kMargin) {
+            const Eigen::Vector3f p =
+                (camera_T_world * record.cell.openPosition.cast<double>()).cast<float>();
+            if (!visible(buffer, p, static_cast<float>(2.0 * cell))) {
                 continue;
             }
             const Benefit b = benefit(record, world_T_camera.translation);
             if (b.area <= 0) {
-                continue;
-            }
-            const int column = std::clamp(static_cast<int>(uv.x()) / kPixels, 0, buffer.width - 1);
-            const int row = std::clamp(static_cast<int>(uv.y()) / kPixels, 0, buffer.height - 1);
-            if (static_cast<double>(buffer.at(column, row)) < p.z() - 2.0 * cell) {
                 continue;
             }
             result.openGain += b.area;
@@ -233,6 +249,80 @@ std::vector<Eigen::Vector3d> ViewScorer::unknownSeen(const Pose& world_T_camera)
     forEachUnknown(world_T_camera, buffer,
                    [&](const Eigen::Vector3d& p, double) { places.push_back(p); });
     return places;
+}
+
+std::vector<float> ViewScorer::worth() const {
+    std::vector<float> worth;
+    worth.reserve(2 * (open_.size() + frontier_.size()));
+    const double cell = summary_->cellSize();
+    for (const RiftRecord* record : open_) {
+        worth.push_back(record->cell.rim * static_cast<float>(weights_.reach * cell));
+        worth.push_back(record->cell.coarse * static_cast<float>(weights_.coarse));
+    }
+    for (const FreeSpace::Frontier& f : frontier_) {
+        const float area = static_cast<float>(weights_.unknown) * f.area.norm();
+        worth.push_back(area);
+        worth.push_back(area * static_cast<float>(weights_.coarse));
+    }
+    return worth;
+}
+
+std::optional<std::size_t> ViewScorer::cellOf(std::uint32_t item) const {
+    return item / 2 < open_.size() ? std::optional<std::size_t>(item / 2) : std::nullopt;
+}
+
+std::optional<std::size_t> ViewScorer::frontierOf(std::uint32_t item) const {
+    return item / 2 < open_.size() ? std::nullopt
+                                   : std::optional<std::size_t>(item / 2 - open_.size());
+}
+
+ViewScorer::Seen ViewScorer::sights(const Pose& world_T_camera) const {
+    const Pose camera_T_world = world_T_camera.inverse();
+    std::vector<const BlockView*> seen;
+    DepthBuffer buffer = draw(camera_T_world, seen);
+    Seen result;
+    result.nearShare = nearShareOf(buffer);
+    const Eigen::Matrix3f rotation = camera_T_world.rotation.cast<float>();
+    const Eigen::Vector3f translation = camera_T_world.translation.cast<float>();
+    const auto voxel = static_cast<float>(frontierEdge_);
+    std::vector<Eigen::Vector3f> places;
+    for (const FreeSpace::Frontier& f : frontier_) {
+        places.emplace_back(rotation * f.centre + translation);
+        if (places.back().z() > 0.05F &&
+            static_cast<double>(places.back().z()) < sensor_.farLimit) {
+            buffer.splat(places.back(), 0.5F * voxel);
+        }
+    }
+    const auto put = [&](std::size_t item, double share) {
+        if (share > 0.02) {
+            result.sights.push_back({static_cast<std::uint32_t>(item), static_cast<float>(share)});
+        }
+    };
+    const auto margin = static_cast<float>(2.0 * summary_->cellSize());
+    for (const BlockView* block : seen) {
+        for (std::size_t i = block->firstOpen; i < block->lastOpen; ++i) {
+            const Eigen::Vector3f p = rotation * open_[i]->cell.openPosition + translation;
+            if (visible(buffer, p, margin)) {
+                const Benefit b = benefit(*open_[i], world_T_camera.translation);
+                put(2 * i, b.torn);
+                put(2 * i + 1, b.coarse);
+            }
+        }
+    }
+    const Eigen::Vector3f eye = world_T_camera.translation.cast<float>();
+    for (std::size_t i = 0; i < frontier_.size(); ++i) {
+        if (!visible(buffer, places[i], 0.6F * voxel)) {
+            continue;
+        }
+        const Eigen::Vector3f ray = (eye - frontier_[i].centre).normalized();
+        const double facing = static_cast<double>(ray.dot(frontier_[i].area.normalized()));
+        const double angle = std::clamp(2.0 * facing, 0.0, 1.0);
+        const auto z = static_cast<double>(places[i].z());
+        const double afar = std::min(1.0, std::pow(kNewSurfaceDepth * goodDepth_ / z, 2));
+        put(2 * (open_.size() + i), angle * afar);
+        put(2 * (open_.size() + i) + 1, angle * std::min(1.0, std::pow(goodDepth_ / z, 4)));
+    }
+    return result;
 }
 
 }  // namespace riftmap

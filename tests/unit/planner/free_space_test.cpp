@@ -133,5 +133,49 @@ TEST(SensorModel, goodDepthFollowsTheNoise) {
     EXPECT_NEAR(sensor.camera.depthSigma(z, 0.25), 0.005, 1e-6);
 }
 
+TEST(FreeSpace, theFrontierIsTheSkinOfWhatIsUnknown) {
+    const Eigen::AlignedBox3d box(Eigen::Vector3d(-1, -1, -1), Eigen::Vector3d(1, 1, 1));
+    const Eigen::AlignedBox3d object(Eigen::Vector3d(-0.5, -0.5, -0.5),
+                                     Eigen::Vector3d(0.5, 0.5, 0.5));
+    FreeSpace space(box, 0.1);
+    EXPECT_TRUE(space.frontier(box).empty());  // nothing was seen: nothing to look from
+    space.declareFreeOutside(object);
+    const auto frontier = space.frontier(object);
+    EXPECT_EQ(frontier.size(), 1000U - 512U);  // the outermost layer of 10 x 10 x 10 voxels
+    Eigen::Vector3f positive = Eigen::Vector3f::Zero();
+    Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+    for (const FreeSpace::Frontier& f : frontier) {
+        positive += f.area.cwiseMax(0.0F);
+        sum += f.area;
+        EXPECT_GT(f.area.dot(f.centre), 0.0F);  // out of the object
+    }
+    EXPECT_LT((positive - Eigen::Vector3f::Ones()).norm(), 1e-4F);  // each side has 1 m^2
+    EXPECT_LT(sum.norm(), 1e-4F);
+
+    // Surface is known; what was looked at in vain is given up.
+    space.setSurface({{0.45, 0.05, 0.05}});
+    EXPECT_EQ(space.frontier(object).size(), frontier.size() - 1);
+    for (int i = 0; i < FreeSpace::kTries; ++i) {
+        space.noteTry({-0.45, 0.05, 0.05});
+    }
+    EXPECT_EQ(space.frontier(object).size(), frontier.size() - 2);
+}
+
+TEST(FreeSpace, surfaceThatWasSeenHasNoFrontierBehindIt) {
+    const Eigen::AlignedBox3d box(Eigen::Vector3d(1, -0.5, -0.5), Eigen::Vector3d(4, 0.5, 0.5));
+    FreeSpace space(kBox, 0.1);
+    const View view = test::viewOf(lookAt({0, 0, 0}, {1, 0, 0}), test::wall(3.03));
+    space.carve(view, sensorOf(view), false);
+    std::vector<Eigen::Vector3d> wall;
+    for (double y = -1; y < 1; y += 0.02) {
+        for (double z = -1; z < 1; z += 0.02) {
+            wall.emplace_back(3.03, y, z);
+        }
+    }
+    EXPECT_FALSE(space.frontier(box).empty());  // until the surface is entered
+    space.setSurface(wall);
+    EXPECT_TRUE(space.frontier(box).empty());
+}
+
 }  // namespace
 }  // namespace riftmap

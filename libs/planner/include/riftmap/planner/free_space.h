@@ -48,6 +48,13 @@ class FreeSpace {
     /// direction is a unit vector.
     UnknownRun firstUnknown(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
                             double length) const;
+    /// An unknown voxel beside free space: surface may be there, or behind it.
+    struct Frontier {
+        Eigen::Vector3f centre;
+        Eigen::Vector3f area;  ///< of its faces towards free space, as a vector out of it [m^2]
+    };
+    /// All of them whose centre is in the box, but those looked at in vain; in a fixed order.
+    std::vector<Frontier> frontier(const Eigen::AlignedBox3d& within) const;
     /// Notes that a view was taken to see this place; places that are unknown still after `kTries`
     /// views do not count as unknown any more.
     void noteTry(const Eigen::Vector3d& point);
@@ -87,7 +94,8 @@ class FreeSpace {
     static constexpr std::uint8_t kKnownBit = 2;  ///< its centre was seen through, or is no place
                                                   ///< to look for surface; not enough to fly there
     static constexpr std::uint8_t kSurfaceBit = 4;
-    static constexpr int kTryShift = 4;  ///< count of vain tries in the upper bits
+    static constexpr std::uint8_t kSeenBit = 8;  ///< the line of sight goes on behind its centre
+    static constexpr int kTryShift = 4;          ///< count of vain tries in the upper bits
 
     bool inside(const Eigen::Vector3i& v) const {
         return (v.array() >= 0).all() && (v.array() < size_.array()).all();

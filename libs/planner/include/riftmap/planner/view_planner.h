@@ -69,6 +69,10 @@ class Knowledge {
     const SurfaceSummary& summary() const { return summary_; }
     const FreeSpace& space() const { return space_; }
     FreeSpace& space() { return space_; }
+    /// Where to look for surface that was not seen yet: a finer grid over the surfaces' box if that
+    /// was declared, else space().
+    const FreeSpace& unseen() const { return hull_ ? *hull_ : space_; }
+    FreeSpace& unseen() { return hull_ ? *hull_ : space_; }
     const RiftLedger& ledger() const { return ledger_; }
     RiftLedger& ledger() { return ledger_; }
     const Pose& camera() const { return camera_; }
@@ -93,6 +97,7 @@ class Knowledge {
     SensorModel sensor_;
     SurfaceSummary summary_;
     FreeSpace space_;
+    std::optional<FreeSpace> hull_;
     RiftLedger ledger_;
     Pose camera_;
     Eigen::Vector3d anchor_ = Eigen::Vector3d::Zero();  ///< where ways over voxels begin

@@ -3,6 +3,8 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include "riftmap/core/pose.h"
@@ -10,6 +12,7 @@
 #include "riftmap/planner/rift_ledger.h"
 #include "riftmap/planner/sensor_model.h"
 #include "riftmap/planner/surface_summary.h"
+#include "riftmap/planner/view_tour.h"
 
 namespace riftmap {
 
@@ -44,10 +47,33 @@ class ViewScorer {
     /// quality of that view of it, 0 (in vain) to 1.
     struct Benefit {
         double area = 0, quality = 0;
+        double torn = 0, coarse = 0;  ///< shares of what the tear and its coarse part are worth
     };
     Benefit benefit(const RiftRecord& record, const Eigen::Vector3d& eye) const;
 
     const std::vector<const RiftRecord*>& open() const { return open_; }
+
+    /// For the choice of several views at once: what there is to see as a list of items. For every
+    /// open cell its tear and its coarse surface, for every place of the frontier the surface that
+    /// may be there and its being known as well as asked.
+    void setFrontier(std::vector<FreeSpace::Frontier> frontier, double edge) {
+        frontier_ = std::move(frontier);
+        frontierEdge_ = edge;
+    }
+    const std::vector<FreeSpace::Frontier>& frontier() const { return frontier_; }
+    /// Of every item [m^2].
+    std::vector<float> worth() const;
+    struct Seen {
+        std::vector<Sight> sights;
+        double nearShare = 0;  ///< of the field of view that is nearer than the near limit
+    };
+    /// What a view would see of them. Surface known and unknown hides what lies behind it.
+    /// Thread-safe.
+    Seen sights(const Pose& world_T_camera) const;
+    /// Index of an item's open cell in open(), or nothing.
+    std::optional<std::size_t> cellOf(std::uint32_t item) const;
+    /// Index of an item's place in frontier(), or nothing.
+    std::optional<std::size_t> frontierOf(std::uint32_t item) const;
 
  private:
     struct BlockView {
@@ -59,6 +85,8 @@ class ViewScorer {
     struct DepthBuffer;
 
     DepthBuffer draw(const Pose& camera_T_world, std::vector<const BlockView*>& seen) const;
+    double nearShareOf(const DepthBuffer& buffer) const;
+    bool visible(const DepthBuffer& buffer, const Eigen::Vector3f& inCamera, float slack) const;
     template <class F>
     void forEachUnknown(const Pose& world_T_camera, const DepthBuffer& buffer, const F& f) const;
 
@@ -70,6 +98,8 @@ class ViewScorer {
     double goodDepth_;
     std::vector<BlockView> blocks_;
     std::vector<const RiftRecord*> open_;  ///< by block, then key
+    std::vector<FreeSpace::Frontier> frontier_;
+    double frontierEdge_ = 0;  ///< of its voxels [m]
 };
 
 }  // namespace riftmap

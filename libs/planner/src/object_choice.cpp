@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The choice of views around an object that stands alone: a tour over views that complement each
+// other.
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "view_choice.h"
+
+namespace riftmap {
+
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+/// Length of the shortest way from a to b around a ball.
+double wayAround(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& centre,
+                 double radius) {
+    const double ra = (a - centre).norm();
+    const double rb = (b - centre).norm();
+    if (ra <= radius || rb <= radius) {
+        return (a - b).norm();
+    }
+    const double angle = std::acos(std::clamp((a - centre).dot(b - centre) / (ra * rb), -1.0, 1.0));
+    const double onBall = angle - std::acos(radius / ra) - std::acos(radius / rb);
+    if (onBall <= 0) {
+        return (a - b).norm();
+    }
+    return std::sqrt(ra * ra - radius * radius) + std::sqrt(rb * rb - radius * radius) +
+           radius * onBall;
+}
+
+}  // namespace
+
+/// Views of a tear from where nothing known hides it: looks out from the tear itself.
+void Choice::addInSight(const RiftRecord& record, int directions, std::size_t most) {
+    const Eigen::Vector3d p = record.cell.openPosition.cast<double>();
+    const Eigen::Vector3d n = record.cell.normal.cast<double>();
+    Eigen::Vector3d facing = n + 0.7 * record.cell.outward.cast<double>();
+    facing = facing.norm() > 1e-3 ? facing.normalized()
+                                  : Eigen::Vector3d((k_.camera().translation - p).normalized());
+    const Eigen::Vector3d t = anyPerpendicular(facing);
+    const Eigen::Vector3d side = facing.cross(t);
+    const double step = k_.unseen().voxelSize();
+    const double turn = uniform(0, 2 * kPi);
+    std::size_t added = 0;
+    // From straight on to far aslant, evenly over the sphere.
+    for (int i = 0; i < directions && added < most; ++i) {
+        const double z = 1.0 - 0.9 * (i + 0.5) / directions;
+        const double r = std::sqrt(1 - z * z);
+        const double a = turn + 2.399963 * i;
+        const Eigen::Vector3d out = z * facing + r * (std::cos(a) * t + std::sin(a) * side);
+        bool hidden = false;
+        for (double s = 2.5 * step; s < 1.5 && !hidden; s += 0.7 * step) {
+            hidden = k_.unseen().at(p + s * out) == FreeSpace::State::kSurface;
+        }
+        if (!hidden) {
+            const double least = 1.15 * k_.sensor().nearLimit;
+            const double distance = uniform(least, std::max(least + 0.1, good_));
+            added += add(p + distance * out, p) ? 1U : 0U;
+        }
+    }
+}
+
+/// Around an object: from all sides, as near as the range allows to as far as the good depth.
+void Choice::addPlacesAround(const Eigen::AlignedBox3d& box) {
+    const double least = std::max(0.5 * k_.sensor().nearLimit, 0.1);
+    const double most = std::max(least + 0.1, 0.8 * good_);
+    for (int i = 0; i < 4 * k_.options().places; ++i) {
+        const double z = uniform(-1, 1);
+        const double a = uniform(0, 2 * kPi);
+        const double r = std::sqrt(1 - z * z);
+        const Eigen::Vector3d out(r * std::cos(a), r * std::sin(a), z);
+        const double away = uniform(least, most);
+        // What is seen at once from there: the rest of the box is for other views.
+        const Eigen::Vector3d spare =
+            (0.5 * box.sizes().array() - 0.35 * (away + 0.3)).max(0.1 * box.sizes().array());
+        const Eigen::Vector3d target =
+            box.center() +
+            spare.cwiseProduct(Eigen::Vector3d(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1)));
+        double exit = std::numeric_limits<double>::infinity();
+        for (int axis = 0; axis < 3; ++axis) {
+            const double side = out[axis] > 0 ? box.max()[axis] : box.min()[axis];
+            if (std::abs(out[axis]) > 1e-6) {
+                exit = std::min(exit, (side - target[axis]) / out[axis]);
+            }
+        }
+        add(target + (exit + away) * out, target);
+    }
+}
+
+/// Gain of views of an object as its tour has it.
+ViewScore Choice::scoreAround(const Pose& pose) const {
+    const ViewScorer::Seen seen = scorer_.sights(pose);
+    ViewScore score;
+    score.nearShare = seen.nearShare;
+    score.gain = SeenItems(worth_).gain(TourView{seen.sights, 0});
+    for (const Sight& s : seen.sights) {
+        if (const auto cell = scorer_.cellOf(s.item); cell && s.share > 0.25F) {
+            score.cells.push_back(scorer_.open()[*cell]->cell.key);
+        }
+    }
+    std::sort(score.cells.begin(), score.cells.end());
+    score.cells.erase(std::unique(score.cells.begin(), score.cells.end()), score.cells.end());
+    return score;
+}
+
+/// Places of the frontier that a view looks at.
+std::vector<Eigen::Vector3d> Choice::frontierSeen(const Pose& pose) const {
+    std::vector<Eigen::Vector3d> places;
+    for (const Sight& s : scorer_.sights(pose).sights) {
+        const auto place = scorer_.frontierOf(s.item);
+        if (place && s.item % 2 == 0 && s.share > 0.25F) {
+            places.push_back(scorer_.frontier()[*place].centre.cast<double>());
+        }
+    }
+    return places;
+}
+
+/// Around an object that stands alone: a tour over views that complement each other, of which the
+/// first is taken.
+std::optional<ViewPlan> Choice::makeAround(const Eigen::AlignedBox3d& box) {
+    addPlacesAround(box);
+    addPool();
+    scorer_.setFrontier(k_.unseen().frontier(box), k_.unseen().voxelSize());
+    worth_ = scorer_.worth();
+    std::vector<TourView> views(candidates_.size());
+    tbb::parallel_for(std::size_t{0}, candidates_.size(), [&](std::size_t i) {
+        ViewScorer::Seen seen = scorer_.sights(candidates_[i].pose);
+        candidates_[i].score.nearShare = seen.nearShare;
+        views[i].fromStart = candidates_[i].path;
+        if (seen.nearShare <= 0.3) {
+            views[i].sights = std::move(seen.sights);
+        }
+    });
+    const double ball = box.sizes().mean() / 2 + k_.limits().clearance;
+    TourOptions options;
+    options.viewCost = k_.options().viewCost;
+    options.minGain = minGain();
+    const ViewTour tour = planTour(
+        views, worth_,
+        [&](std::size_t a, std::size_t b) {
+            return wayAround(candidates_[a].pose.translation, candidates_[b].pose.translation,
+                             box.center(), ball);
+        },
+        options);
+    pool_.clear();
+    for (std::size_t i = 1; i < tour.views.size(); ++i) {
+        pool_.push_back(candidates_[tour.views[i]].pose);
+    }
+    if (tour.views.empty()) {
+        return lastResorts(minGain());
+    }
+    candidates_ = {Candidate(candidates_[tour.views.front()])};
+    for (int round = 0; round < 2; ++round) {
+        refine(Candidate(candidates_.front()));
+        scoreFrom(0);
+        candidates_ = {Candidate(*best())};
+    }
+    return planFor(candidates_.front());
+}
+
+}  // namespace riftmap

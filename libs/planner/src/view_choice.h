@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The work of RiftPlanner on one plan.
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <random>
+#include <vector>
+
+#include "riftmap/planner/view_planner.h"
+
+namespace riftmap {
+
+struct Candidate {
+    Pose pose;
+    double path = 0;  ///< [m]
+    ViewScore score;
+    double utility = 0;  ///< gain for a metre
+};
+
+/// A unit vector at a right angle to `n`.
+Eigen::Vector3d anyPerpendicular(const Eigen::Vector3d& n);
+
+/// One plan: makes candidates, scores them, picks.
+class Choice {
+ public:
+    Choice(Knowledge& knowledge, std::vector<Pose>& pool);
+
+    std::optional<ViewPlan> make();
+
+ private:
+    double uniform(double a, double b) {
+        return a + (b - a) * static_cast<double>(random_()) / 4294967296.0;
+    }
+    bool add(const Eigen::Vector3d& eye, const Eigen::Vector3d& target);
+    void addAround(const RiftRecord& record, int directions);
+    void addInSight(const RiftRecord& record, int directions, std::size_t most);
+    void thinOut();
+    void addTurns();
+    void addPlaces();
+    void addPool();
+    void keepPool();
+    void refine(const Candidate& best);
+    ViewScore scoreAround(const Pose& pose) const;
+    void scoreFrom(std::size_t first);
+    const Candidate* best() const;
+    std::vector<Eigen::Vector3d> frontierSeen(const Pose& pose) const;
+    std::optional<ViewPlan> planFor(const Candidate& candidate) const;
+    std::optional<ViewPlan> lastResorts(double minGain);
+    bool lineOfSight(const Eigen::Vector3d& eye, const Eigen::Vector3d& target) const;
+    std::optional<ViewPlan> makeAround(const Eigen::AlignedBox3d& box);
+    void addPlacesAround(const Eigen::AlignedBox3d& box);
+    double minGain() const;
+
+    Knowledge& k_;
+    std::vector<Pose>& pool_;
+    ViewScorer scorer_;
+    std::mt19937 random_;
+    double good_;
+    std::vector<Candidate> candidates_;
+    std::vector<float> worth_;  ///< of the items of a tour
+};
+
+}  // namespace riftmap

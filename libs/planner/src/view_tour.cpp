@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "riftmap/planner/view_tour.h"
+
+#include <algorithm>
+#include <limits>
+
+namespace riftmap {
+
+namespace {
+
+constexpr double kNever = std::numeric_limits<double>::infinity();
+
+/// Cheapest place for one more stop in an open tour.
+struct Insertion {
+    std::size_t position = 0;
+    double detour = kNever;  ///< [m]
+};
+
+Insertion cheapestInsertion(const std::vector<TourView>& views, const WayLength& between,
+                            const std::vector<std::size_t>& tour, std::size_t view) {
+    Insertion best;
+    for (std::size_t i = 0; i <= tour.size(); ++i) {
+        const auto to = [&](std::size_t v) {
+            return i == 0 ? views[v].fromStart : between(tour[i - 1], v);
+        };
+        double detour = to(view);
+        if (i < tour.size()) {
+            detour += between(view, tour[i]) - to(tour[i]);
+        }
+        if (detour < best.detour) {
+            best = {i, detour};
+        }
+    }
+    return best;
+}
+
+/// Gain of every subset of the stops; bit i of the index stands for stops[i].
+std::vector<double> gainsOfSubsets(const std::vector<TourView>& views,
+                                   const std::vector<float>& worth,
+                                   const std::vector<std::size_t>& stops) {
+    std::vector<double> gains(std::size_t{1} << stops.size(), 0.0);
+    const auto extend = [&](const auto& self, const SeenItems& seen, std::size_t set,
+                            std::size_t first) -> void {
+        for (std::size_t i = first; i < stops.size(); ++i) {
+            SeenItems more = seen;
+            const std::size_t larger = set | std::size_t{1} << i;
+            gains[larger] = gains[set] + more.add(views[stops[i]]);
+            self(self, more, larger, i + 1);
+        }
+    };
+    extend(extend, SeenItems(worth), 0, 0);
+    return gains;
+}
+
+/// Order of the stops with least tourCost(), by dynamic programming over subsets.
+std::vector<std::size_t> bestOrder(const std::vector<TourView>& views,
+                                   const std::vector<float>& worth, const WayLength& between,
+                                   const TourOptions& options,
+                                   const std::vector<std::size_t>& stops) {
+    const std::size_t n = stops.size();
+    const std::size_t all = (std::size_t{1} << n) - 1;
+    const std::vector<double> gains = gainsOfSubsets(views, worth, stops);
+    const auto weight = [&](std::size_t seen) {
+        return options.tail + (gains[all] > 0 ? 1.0 - gains[seen] / gains[all] : 0.0);
+    };
+    std::vector<double> way(n * n);
+    for (std::size_t i = 0; i < n * n; ++i) {
+        way[i] = between(stops[i / n], stops[i % n]);
+    }
+    // cost[set * n + last]: of the cheapest order of a set that ends there.
+    std::vector<double> cost((all + 1) * n, kNever);
+    std::vector<std::uint8_t> before((all + 1) * n, 0);
+    for (std::size_t set = 1; set <= all; ++set) {
+        for (std::size_t last = 0; last < n; ++last) {
+            if ((set >> last & 1U) == 0) {
+                continue;
+            }
+            const std::size_t rest = set & ~(std::size_t{1} << last);
+            double& best = cost[set * n + last];
+            if (rest == 0) {
+                best = weight(0) * (options.viewCost + views[stops[last]].fromStart);
+            }
+            for (std::size_t from = 0; from < n; ++from) {
+                const double c = cost[rest * n + from] +
+                                 weight(rest) * (options.viewCost + way[from * n + last]);
+                if ((rest >> from & 1U) != 0 && c < best) {
+                    best = c;
+                    before[set * n + last] = static_cast<std::uint8_t>(from);
+                }
+            }
+        }
+    }
+    const auto end = cost.begin() + static_cast<std::ptrdiff_t>(all * n);
+    auto last =
+        static_cast<std::size_t>(std::min_element(end, end + static_cast<std::ptrdiff_t>(n)) - end);
+    std::vector<std::size_t> order;
+    for (std::size_t set = all; set != 0;) {
+        order.push_back(stops[last]);
+        const std::size_t from = before[set * n + last];
+        set &= ~(std::size_t{1} << last);
+        last = from;
+    }
+    std::reverse(order.begin(), order.end());
+    return order;
+}
+
+}  // namespace
+
+double SeenItems::gain(const TourView& view) const {
+    double sum = 0;
+    for (const Sight& s : view.sights) {
+        const float missing = 1.0F - seen_[s.item];
+        sum += static_cast<double>((*worth_)[s.item] * std::min(missing, s.share));
+    }
+    return sum;
+}
+
+double SeenItems::add(const TourView& view) {
+    const double sum = gain(view);
+    for (const Sight& s : view.sights) {
+        seen_[s.item] = std::min(1.0F, seen_[s.item] + s.share);
+    }
+    return sum;
+}
+
+double tourCost(const std::vector<TourView>& views, const std::vector<float>& worth,
+                const WayLength& between, const TourOptions& options,
+                const std::vector<std::size_t>& order) {
+    SeenItems everything(worth);
+    double whole = 0;
+    for (const std::size_t v : order) {
+        whole += everything.add(views[v]);
+    }
+    SeenItems seen(worth);
+    double missing = whole;
+    double cost = 0;
+    for (std::size_t i = 0; i < order.size(); ++i) {
+        const double way = i == 0 ? views[order[i]].fromStart : between(order[i - 1], order[i]);
+        cost += (options.tail + (whole > 0 ? missing / whole : 0.0)) * (options.viewCost + way);
+        missing -= seen.add(views[order[i]]);
+    }
+    return cost;
+}
+
+ViewTour planTour(const std::vector<TourView>& views, const std::vector<float>& worth,
+                  const WayLength& between, const TourOptions& options) {
+    std::vector<std::size_t> stops;
+    SeenItems seen(worth);
+    // What a view adds only shrinks as others are picked: the last value is an upper bound.
+    std::vector<double> bound(views.size(), kNever);
+    while (stops.size() < options.maxViews) {
+        std::size_t best = views.size();
+        double bestUtility = 0;
+        Insertion bestPlace;
+        for (std::size_t v = 0; v < views.size(); ++v) {
+            const Insertion place = cheapestInsertion(views, between, stops, v);
+            const double cost = options.viewCost + std::max(0.0, place.detour);
+            if (bound[v] <= options.minGain || bound[v] / cost <= bestUtility) {
+                continue;
+            }
+            bound[v] = seen.gain(views[v]);
+            if (bound[v] > options.minGain && bound[v] / cost > bestUtility) {
+                best = v;
+                bestUtility = bound[v] / cost;
+                bestPlace = place;
+            }
+        }
+        if (best == views.size()) {
+            break;
+        }
+        seen.add(views[best]);
+        bound[best] = 0;  // the same view once more shows nothing new
+        stops.insert(stops.begin() + static_cast<std::ptrdiff_t>(bestPlace.position), best);
+    }
+    ViewTour tour;
+    if (stops.empty()) {
+        return tour;
+    }
+    tour.views = bestOrder(views, worth, between, options, stops);
+    tour.cost = tourCost(views, worth, between, options, tour.views);
+    SeenItems again(worth);
+    for (std::size_t i = 0; i < tour.views.size(); ++i) {
+        const std::size_t v = tour.views[i];
+        tour.gains.push_back(again.add(views[v]));
+        tour.length += i == 0 ? views[v].fromStart : between(tour.views[i - 1], v);
+    }
+    return tour;
+}
+
+}  // namespace riftmap

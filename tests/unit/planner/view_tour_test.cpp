@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "riftmap/planner/view_tour.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <numeric>
+#include <random>
+
+namespace riftmap {
+namespace {
+
+/// Views at random places in the plane, each of which sees some of the items a little or in full.
+struct Scene {
+    explicit Scene(unsigned seed, std::size_t viewCount, std::size_t itemCount = 40) {
+        std::mt19937 random(seed);
+        const auto uniform = [&] { return static_cast<double>(random()) / 4294967296.0; };
+        for (std::size_t i = 0; i < itemCount; ++i) {
+            worth.push_back(static_cast<float>(0.1 + uniform()));
+        }
+        for (std::size_t v = 0; v < viewCount; ++v) {
+            places.emplace_back(4 * uniform(), 4 * uniform());
+            TourView view;
+            view.fromStart = places.back().norm();
+            for (std::uint32_t i = 0; i < itemCount; ++i) {
+                if (uniform() < 0.3) {
+                    view.sights.push_back({i, static_cast<float>(0.05 + 0.95 * uniform())});
+                }
+            }
+            views.push_back(std::move(view));
+        }
+    }
+    WayLength between() const {
+        return [this](std::size_t a, std::size_t b) { return (places[a] - places[b]).norm(); };
+    }
+    /// The definition, word by word.
+    double cost(const TourOptions& options, const std::vector<std::size_t>& order) const {
+        const auto seen = [&](std::size_t count) {
+            double sum = 0;
+            for (std::uint32_t i = 0; i < worth.size(); ++i) {
+                double share = 0;
+                for (std::size_t k = 0; k < count; ++k) {
+                    for (const Sight& s : views[order[k]].sights) {
+                        share += s.item == i ? static_cast<double>(s.share) : 0.0;
+                    }
+                }
+                sum += static_cast<double>(worth[i]) * std::min(1.0, share);
+            }
+            return sum;
+        };
+        const double whole = seen(order.size());
+        double sum = 0;
+        for (std::size_t k = 0; k < order.size(); ++k) {
+            const double way = k == 0 ? views[order[0]].fromStart
+                                      : (places[order[k - 1]] - places[order[k]]).norm();
+            sum += (1 - seen(k) / whole + options.tail) * (options.viewCost + way);
+        }
+        return sum;
+    }
+
+    std::vector<Eigen::Vector2d> places;
+    std::vector<TourView> views;
+    std::vector<float> worth;
+};
+
+TEST(ViewTour, CostIsTheAreaOverTheCurve) {
+    const Scene scene(7, 5);
+    TourOptions options;
+    options.tail = 0.3;
+    const std::vector<std::size_t> order = {3, 0, 4, 1};
+    EXPECT_NEAR(tourCost(scene.views, scene.worth, scene.between(), options, order),
+                scene.cost(options, order), 1e-4);
+}
+
+TEST(ViewTour, NoOrderIsCheaper) {
+    for (unsigned seed = 0; seed < 12; ++seed) {
+        const Scene scene(seed, 30);
+        TourOptions options;
+        options.maxViews = 6;
+        options.tail = seed % 3 == 0 ? 0.0 : 0.4;
+        const ViewTour tour = planTour(scene.views, scene.worth, scene.between(), options);
+        ASSERT_EQ(tour.views.size(), 6U);
+        EXPECT_NEAR(tour.cost, scene.cost(options, tour.views), 1e-4) << "seed " << seed;
+        std::vector<std::size_t> order = tour.views;
+        std::sort(order.begin(), order.end());
+        do {
+            ASSERT_LE(tour.cost, scene.cost(options, order) + 1e-4) << "seed " << seed;
+        } while (std::next_permutation(order.begin(), order.end()));
+    }
+}
+
+TEST(ViewTour, PicksAsTheSlowGreedyDoes) {
+    for (unsigned seed = 100; seed < 120; ++seed) {
+        const Scene scene(seed, 60);
+        TourOptions options;
+        options.minGain = 0.5;
+        options.maxViews = 7;
+        // Gain and detour of every view, anew for every pick.
+        std::vector<std::size_t> slow;
+        SeenItems seen(scene.worth);
+        while (slow.size() < options.maxViews) {
+            double best = 0;
+            std::vector<std::size_t> next;
+            std::size_t pick = 0;
+            for (std::size_t v = 0; v < scene.views.size(); ++v) {
+                if (std::find(slow.begin(), slow.end(), v) != slow.end()) {
+                    continue;
+                }
+                const double gain = seen.gain(scene.views[v]);
+                const auto length = [&](const std::vector<std::size_t>& t) {
+                    double sum = t.empty() ? 0.0 : scene.views[t[0]].fromStart;
+                    for (std::size_t i = 1; i < t.size(); ++i) {
+                        sum += (scene.places[t[i - 1]] - scene.places[t[i]]).norm();
+                    }
+                    return sum;
+                };
+                double shortest = 1e9;
+                std::vector<std::size_t> where;
+                for (std::size_t i = 0; i <= slow.size(); ++i) {
+                    std::vector<std::size_t> t = slow;
+                    t.insert(t.begin() + static_cast<std::ptrdiff_t>(i), v);
+                    if (length(t) < shortest) {
+                        shortest = length(t);
+                        where = t;
+                    }
+                }
+                const double utility = gain / (options.viewCost + shortest - length(slow));
+                if (gain > options.minGain && utility > best + 1e-12) {
+                    best = utility;
+                    next = where;
+                    pick = v;
+                }
+            }
+            if (best == 0) {
+                break;
+            }
+            seen.add(scene.views[pick]);
+            slow = next;
+        }
+        const ViewTour tour = planTour(scene.views, scene.worth, scene.between(), options);
+        std::vector<std::size_t> a = tour.views;
+        std::sort(a.begin(), a.end());
+        std::sort(slow.begin(), slow.end());
+        EXPECT_EQ(a, slow) << "seed " << seed;
+    }
+}
+
+TEST(ViewTour, GainsAddUpAndWhatWasSeenCountsNoMore) {
+    // Two views of the same item, one of another: the second of the same brings nothing.
+    const std::vector<float> worth = {2.0F, 1.0F};
+    const std::vector<TourView> views = {
+        {{{0, 1.0F}}, 1.0}, {{{0, 0.9F}}, 0.5}, {{{1, 0.5F}}, 3.0}};
+    const WayLength between = [](std::size_t, std::size_t) { return 1.0; };
+    TourOptions options;
+    options.minGain = 0.25;
+    const ViewTour tour = planTour(views, worth, between, options);
+    ASSERT_EQ(tour.views.size(), 2U);
+    EXPECT_EQ(tour.views[0], 1U);  // nearer, and nearly as good
+    EXPECT_EQ(tour.views[1], 2U);
+    EXPECT_NEAR(tour.gains[0], 1.8, 1e-5);
+    EXPECT_NEAR(tour.gains[1], 0.5, 1e-5);
+    EXPECT_NEAR(tour.length, 1.5, 1e-9);
+    // Shares add up to the whole at most.
+    SeenItems seen(worth);
+    EXPECT_NEAR(seen.add(views[1]), 1.8, 1e-5);
+    EXPECT_NEAR(seen.add(views[0]), 0.2, 1e-5);
+    EXPECT_NEAR(seen.add(views[0]), 0.0, 1e-6);
+}
+
+TEST(ViewTour, EmptyWhereNothingIsWorthAView) {
+    const Scene scene(5, 20);
+    TourOptions options;
+    options.minGain = 1e3;
+    EXPECT_TRUE(planTour(scene.views, scene.worth, scene.between(), options).views.empty());
+    EXPECT_TRUE(planTour({}, scene.worth, scene.between(), options).views.empty());
+}
+
+}  // namespace
+}  // namespace riftmap
