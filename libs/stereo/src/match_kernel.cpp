@@ -331,6 +331,8 @@ void finishRow(const MatchJob& job, const Strip& s, const Minima& m, int row) {
     const auto i32 = [&](int v) { return hn::Set(di, v); };
     const auto f32 = [&](float v) { return hn::Set(df, v); };
     const std::size_t rowStart = static_cast<std::size_t>(row) * s.width;
+    std::fill_n(job.disparity + rowStart, job.firstColumn, std::numeric_limits<float>::infinity());
+    std::fill_n(job.sigma + rowStart, job.firstColumn, 0.0F);
     for (auto x = static_cast<std::size_t>(job.firstColumn); x < s.width; x += n) {
         const auto best = wide(m.best + x);
         const auto index = wide(m.index + x);

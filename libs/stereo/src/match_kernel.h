@@ -24,7 +24,7 @@ struct MatchJob {
     int minDisparity;       ///< [px]
     int numDisparities;     ///< D; index i stands for minDisparity + i
     int paddedDisparities;  ///< D rounded up to kLanes
-    int firstColumn;        ///< columns before it are not written
+    int firstColumn;        ///< columns before it are not matched
 
     const std::uint8_t* left;           ///< `width` a row
     const std::uint8_t* rightReversed;  ///< see reverseRight(); `reversedStride` a row

@@ -2,8 +2,8 @@
 #include "riftmap/stereo/paper_matcher.h"
 
 #include <hwy/aligned_allocator.h>
-#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
@@ -68,6 +68,8 @@ class Level {
                int firstColumn, DisparityImage& out);
 
  private:
+    static constexpr int kStripsPerThread = 4;
+
     std::vector<std::uint8_t> left_, right_, reversed_;
     std::vector<AlignedBuffer<std::uint16_t>> scratch_;  ///< one a strip
 };
@@ -117,7 +119,10 @@ void Level::match(const StereoOptions& options, const cv::Mat& left, const cv::M
     left_.resize(w * h);
     right_.resize(w * h);
     reversed_.resize(stride * h);
-    out.resize(width, height);
+    out.width = width;
+    out.height = height;
+    out.disparity.resize(w * h);  // matchRows() writes every pixel
+    out.sigma.resize(w * h);
     job.firstColumn = firstColumn;
     job.left = left_.data();
     job.rightReversed = reversed_.data();
@@ -125,8 +130,10 @@ void Level::match(const StereoOptions& options, const cv::Mat& left, const cv::M
     job.disparity = out.disparity.data();
     job.sigma = out.sigma.data();
 
-    // Strips only share out the work: each row comes out the same whatever strip it is in.
-    const int strips = std::clamp(tbb::this_task_arena::max_concurrency(), 1, height);
+    // Strips only share out the work: each row comes out the same whatever strip it is in. A strip
+    // costs as much as two rows to begin; several a thread keep all of them busy to the end.
+    const int threads = tbb::this_task_arena::max_concurrency();
+    const int strips = std::clamp(threads > 1 ? kStripsPerThread * threads : 1, 1, height);
     scratch_.resize(std::max(scratch_.size(), static_cast<std::size_t>(strips)));
     const std::size_t scratchSize = std::max(kernel::scratchSize(job), 2 * (w + 16));
     const auto inStrips = [&](auto&& work) {
@@ -155,20 +162,23 @@ void Level::match(const StereoOptions& options, const cv::Mat& left, const cv::M
 
 constexpr int kCoarse = 4;  ///< side of the blocks that are one pixel of the coarse level
 
-/// Means of whole blocks of kCoarse x kCoarse pixels.
-void shrink(const cv::Mat& image, cv::Mat& out) {
+/// Means of whole blocks of kCoarse x kCoarse pixels. `sums`: scratch.
+void shrink(const cv::Mat& image, std::vector<std::uint16_t>& sums, cv::Mat& out) {
+    static_assert(kCoarse == 4);
     out.create(image.rows / kCoarse, image.cols / kCoarse, CV_8UC1);
+    sums.resize(static_cast<std::size_t>(image.cols));
     for (int r = 0; r < out.rows; ++r) {
+        const auto* row0 = image.ptr<std::uint8_t>(kCoarse * r);
+        const auto* row1 = image.ptr<std::uint8_t>(kCoarse * r + 1);
+        const auto* row2 = image.ptr<std::uint8_t>(kCoarse * r + 2);
+        const auto* row3 = image.ptr<std::uint8_t>(kCoarse * r + 3);
+        for (std::size_t c = 0; c < sums.size(); ++c) {
+            sums[c] = static_cast<std::uint16_t>(row0[c] + row1[c] + row2[c] + row3[c]);
+        }
         auto* to = out.ptr<std::uint8_t>(r);
         for (int c = 0; c < out.cols; ++c) {
-            int sum = kCoarse * kCoarse / 2;
-            for (int i = 0; i < kCoarse; ++i) {
-                const auto* from = image.ptr<std::uint8_t>(kCoarse * r + i, kCoarse * c);
-                for (int j = 0; j < kCoarse; ++j) {
-                    sum += from[j];
-                }
-            }
-            to[c] = static_cast<std::uint8_t>(sum / (kCoarse * kCoarse));
+            const std::uint16_t* s = sums.data() + kCoarse * static_cast<std::ptrdiff_t>(c);
+            to[c] = static_cast<std::uint8_t>((s[0] + s[1] + s[2] + s[3] + 8) / 16);
         }
     }
 }
@@ -178,7 +188,9 @@ void shrink(const cv::Mat& image, cv::Mat& out) {
 /// explanation lies beyond.
 class NearGuard {
  public:
-    void apply(const StereoOptions& options, const GreyPair& pair, DisparityImage& image) {
+    /// Looks for surfaces beyond the range.
+    void search(const StereoOptions& options, const GreyPair& pair) {
+        found_.resize(0, 0);
         StereoOptions coarse = options;
         const int end = options.minDisparity + options.numDisparities + options.guard;
         coarse.minDisparity = static_cast<int>(std::floor(options.minDisparity / double{kCoarse}));
@@ -188,18 +200,16 @@ class NearGuard {
         coarse.window = std::min(options.window, 7);
         coarse.semiGlobal = false;
         coarse.subpixel = true;
-        if (options.guard <= 0 || image.width < 2 * kCoarse || image.height < 2 * kCoarse) {
+        if (options.guard <= 0 || pair.left.cols < 2 * kCoarse || pair.left.rows < 2 * kCoarse) {
             return;
         }
-        shrink(pair.left, left_);
-        shrink(pair.right, right_);
+        shrink(pair.left, sums_, left_);
+        shrink(pair.right, sums_, right_);
         level_.match(coarse, left_, right_, 0, found_);
         // A wrong match here would cost true ones there: it must not stand alone.
         isolated_.apply(found_, kLeastSurface, 1.0F);
-        discard(image);
     }
 
- private:
     /// Discards what lies in or beside a coarse pixel whose surface is too near.
     void discard(DisparityImage& image) const {
         const float beyond = image.maxDisparity + 2;
@@ -212,6 +222,8 @@ class NearGuard {
             }
         }
     }
+
+ private:
     static void clear(DisparityImage& image, cv::Rect block) {
         block &= cv::Rect(0, 0, image.width, image.height);
         for (int r = block.y; r < block.y + block.height; ++r) {
@@ -224,6 +236,7 @@ class NearGuard {
 
     Level level_;
     IsolatedFilter isolated_;
+    std::vector<std::uint16_t> sums_;
     cv::Mat left_, right_;
     DisparityImage found_;
 };
@@ -255,8 +268,10 @@ void PaperMatcher::compute(const cv::Mat& left, const cv::Mat& right, DisparityI
     out.minDisparity = static_cast<float>(options_.minDisparity);
     out.maxDisparity = static_cast<float>(maxDisparity);
     out.firstColumn = std::clamp(maxDisparity, 0, b.grey.left.cols);
-    b.level.match(options_, b.grey.left, b.grey.right, out.firstColumn, out);
-    b.guard.apply(options_, b.grey, out);
+    tbb::parallel_invoke(
+        [&] { b.level.match(options_, b.grey.left, b.grey.right, out.firstColumn, out); },
+        [&] { b.guard.search(options_, b.grey); });
+    b.guard.discard(out);
     b.isolated.apply(out, options_.isolatedSize, static_cast<float>(options_.isolatedDifference));
     discardSilhouettes(out, options_.silhouetteReach, static_cast<float>(options_.silhouetteStep),
                        b.scratch);
