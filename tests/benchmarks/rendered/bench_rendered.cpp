@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "objects.h"
 #include "riftmap/sim/simulated_platform.h"
 #include "riftmap/stereo/stereo_matcher.h"
 #include "riftmap/stereo/view_builder.h"
@@ -101,13 +102,15 @@ Tally rendered(WorldOptions::Name name, const Matcher& matcher) {
     return tally;
 }
 
+std::string dataFolder() {
+    const char* data = std::getenv("RIFTMAP_DATA");
+    return data != nullptr ? data : RIFTMAP_SOURCE_DIR "/../shared/data";
+}
+
 /// Middlebury's cones: truth in quarter pixels, 0 unknown, for the left (disp2) and the right
 /// image (disp6); seen by both where the two agree within a pixel.
 bool real(const Matcher& matcher, Tally& tally) {
-    const char* data = std::getenv("RIFTMAP_DATA");
-    const std::string folder =
-        (data != nullptr ? std::string(data) : std::string(RIFTMAP_SOURCE_DIR "/../shared/data")) +
-        "/middlebury/cones/";
+    const std::string folder = dataFolder() + "/middlebury/cones/";
     const cv::Mat left = cv::imread(folder + "im2.png");
     const cv::Mat right = cv::imread(folder + "im6.png");
     const cv::Mat truthLeft = cv::imread(folder + "disp2.png", cv::IMREAD_GRAYSCALE);
@@ -151,9 +154,37 @@ void report(std::ostream& csv, const std::string& name, Tally& t) {
                 name.c_str(), matched, bad1, bad2, median);
 }
 
-int run(const std::string& file) {
-    std::ofstream csv(file);
-    csv << "figure,value,unit\n";
+void scoreObjects(const std::vector<std::string>& settings, std::ostream& csv) {
+    const std::pair<const char*, const char*> kMeshes[] = {
+        {"bunny", "/objects/stanford_bunny_35k.obj"},
+        {"dragon", "/objects/stanford_dragon_res3.ply"}};
+    for (const Matcher& matcher : kMatchers) {
+        StereoOptions options;
+        options.matcher = matcher.kind;
+        if (matcher.kind == MatcherKind::kPaper) {
+            OptionTable table;
+            options.describe(table);
+            for (const std::string& setting : settings) {
+                table.set(setting);
+            }
+        }
+        for (const auto& [name, file] : kMeshes) {
+            WorldOptions world;
+            world.mesh = dataFolder() + file;
+            world.meshOptions.size = 1.0;
+            if (!std::filesystem::exists(world.mesh)) {
+                std::printf("%s: SKIPPED, not in %s\n", name, dataFolder().c_str());
+                continue;
+            }
+            scoreObject(std::string(matcher.name) + "." + name, world, options, csv);
+        }
+        if (!settings.empty()) {
+            break;  // another setting of our matcher: the others do not change
+        }
+    }
+}
+
+void scoreWorlds(std::ostream& csv) {
     for (const Matcher& matcher : kMatchers) {
         for (const auto& [name, world] : {std::pair{"room", WorldOptions::Name::kRoom},
                                           {"rooms", WorldOptions::Name::kRooms},
@@ -168,6 +199,38 @@ int run(const std::string& file) {
             std::printf("SKIPPED: the real pair is not there (RIFTMAP_DATA)\n");
         }
     }
+}
+
+int run(int argc, char** argv) {
+    std::string file, part = "all";
+    std::vector<std::string> settings;
+    for (int i = 1; i + 1 < argc; i += 2) {
+        const std::string flag = argv[i];
+        if (flag == "--csv") {
+            file = argv[i + 1];
+        } else if (flag == "--part") {
+            part = argv[i + 1];
+        } else if (flag == "--set") {
+            settings.emplace_back(argv[i + 1]);
+        } else {
+            file.clear();
+            break;
+        }
+    }
+    if (file.empty() || argc % 2 == 0) {
+        std::fprintf(stderr,
+                     "usage: bench-rendered --csv FILE [--part all|worlds|objects] "
+                     "[--set Stereo.key=value]... (objects, our matcher alone)\n");
+        return 2;
+    }
+    std::ofstream csv(file);
+    csv << "figure,value,unit\n";
+    if (part != "objects") {
+        scoreWorlds(csv);
+    }
+    if (part != "worlds") {
+        scoreObjects(settings, csv);
+    }
     csv.close();
     return csv ? 0 : 1;
 }
@@ -176,9 +239,10 @@ int run(const std::string& file) {
 }  // namespace riftmap
 
 int main(int argc, char** argv) {
-    if (argc != 3 || std::string(argv[1]) != "--csv") {
-        std::fprintf(stderr, "usage: bench-rendered --csv FILE\n");
-        return 2;
+    try {
+        return riftmap::run(argc, argv);
+    } catch (const std::exception& e) {
+        std::fprintf(stderr, "bench-rendered: %s\n", e.what());
+        return 1;
     }
-    return riftmap::run(argv[2]);
 }
