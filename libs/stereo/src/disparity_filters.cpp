@@ -5,8 +5,11 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
+
+#include "filter_kernel.h"
 
 namespace riftmap {
 
@@ -139,36 +142,43 @@ void IsolatedFilter::apply(DisparityImage& image, int minSize, float maxDifferen
     }
 }
 
-void discardSilhouettes(DisparityImage& image, int reach, float step, std::vector<float>& scratch) {
+void discardSilhouettes(DisparityImage& image, int reach, int rows, float step,
+                        std::vector<float>& scratch) {
     if (reach <= 0 || image.width == 0) {
         return;
     }
     const auto width = static_cast<std::size_t>(image.width);
-    const auto r = static_cast<std::size_t>(reach);
     // Least disparity of the columns within reach, row by row; infinity never wins.
     scratch.resize(image.disparity.size());
     tbb::parallel_for(0, image.height, [&](int row) {
-        const float* d = image.disparity.data() + image.index(0, row);
-        float* least = scratch.data() + image.index(0, row);
-        std::copy(d, d + width, least);
-        for (std::size_t k = 1; k <= r && k < width; ++k) {
-            for (std::size_t c = 0; c + k < width; ++c) {
-                least[c] = std::min(least[c], d[c + k]);
-            }
-            for (std::size_t c = k; c < width; ++c) {
-                least[c] = std::min(least[c], d[c - k]);
-            }
-        }
+        kernel::leastAlong(image.disparity.data() + image.index(0, row), width,
+                           static_cast<std::size_t>(reach), scratch.data() + image.index(0, row));
     });
     tbb::parallel_for(0, image.height, [&](int row) {
-        float* d = image.disparity.data() + image.index(0, row);
-        const int last = std::min(image.height - 1, row + reach);
-        for (int other = std::max(0, row - reach); other <= last; ++other) {
-            const float* least = scratch.data() + image.index(0, other);
-            for (std::size_t c = 0; c < width; ++c) {
-                d[c] = d[c] - least[c] > step ? kNoDisparity : d[c];
-            }
+        const int first = std::max(0, row - rows);
+        const int last = std::min(image.height - 1, row + rows);
+        std::array<const float*, 2 * kMaxSilhouetteRows + 1> least{};
+        std::size_t count = 0;
+        for (int other = first; other <= last; ++other) {
+            least.at(count++) = scratch.data() + image.index(0, other);
         }
+        kernel::discardAbove(least.data(), count, width, step,
+                             image.disparity.data() + image.index(0, row));
+    });
+}
+
+void growSigmaWithSlope(DisparityImage& image, float slope) {
+    if (slope <= 0) {
+        return;
+    }
+    constexpr int kReach = static_cast<int>(kernel::kSlopeReach);
+    tbb::parallel_for(0, image.height, [&](int row) {
+        const auto rowOf = [&](int r) { return image.disparity.data() + image.index(0, r); };
+        const float* d = rowOf(row);
+        const float* up = row >= kReach ? rowOf(row - kReach) : d;
+        const float* down = row + kReach < image.height ? rowOf(row + kReach) : d;
+        kernel::growSigma(d, up, down, static_cast<std::size_t>(image.width), slope,
+                          image.sigma.data() + image.index(0, row));
     });
 }
 

@@ -2,6 +2,7 @@
 #include "match_kernel.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <cstring>
 #include <limits>
 
@@ -40,12 +41,14 @@ struct Strip {
         rightBest = pathLeft + width * stride;
         rightIndex = rightBest + width + stride;
         best = rightIndex + width + stride;
+        ownBest = best + kMinima * resultStride();
     }
     std::size_t ringStride() const { return (width + 2 * offset) * depth; }
     /// Window sums of this row, column 0.
     U16* windowRow(int row) const {
         return ring + static_cast<std::size_t>(row % ringRows) * ringStride() + offset * depth;
     }
+    static constexpr std::size_t kMinima = 6;  ///< arrays of Minima
     std::size_t resultStride() const { return width + kLanes; }
 
     std::size_t depth;   ///< padded disparities
@@ -59,13 +62,14 @@ struct Strip {
     U16* pathLeft;   ///< likewise: the one that goes left
     U16* rightBest;  ///< by position in the reversed right row
     U16* rightIndex;
-    U16* best;  ///< start of the row's minima, see Minima
+    U16* best;     ///< start of the row's minima, see Minima
+    U16* ownBest;  ///< likewise, before the semi-global pass
 };
 
 /// What the search found for each pixel of a row.
 struct Minima {
-    explicit Minima(const Strip& s)
-        : best(s.best),
+    Minima(const Strip& s, U16* start)
+        : best(start),
           index(best + s.resultStride()),
           ambiguous(index + s.resultStride()),
           before(ambiguous + s.resultStride()),
@@ -268,15 +272,14 @@ void searchRight(const Strip& s, std::size_t from, std::size_t to) {
 }
 
 /// Rival costs below this make a match ambiguous.
-HWY_INLINE U16 rivalLimit(const MatchJob& job, U16 best) {
-    const std::uint32_t limit = best +
-                                (best * static_cast<std::uint32_t>(job.uniquenessRatio) >> 16U) +
-                                static_cast<std::uint32_t>(job.uniquenessMargin) + 1;
+HWY_INLINE U16 rivalLimit(int ratio, int margin, U16 best) {
+    const std::uint32_t limit = best + (best * static_cast<std::uint32_t>(ratio) >> 16U) +
+                                static_cast<std::uint32_t>(margin) + 1;
     return static_cast<U16>(std::min<std::uint32_t>(kWorst, limit));
 }
 
-/// The best match of each left pixel in [from, to).
-void searchLeft(const MatchJob& job, const Strip& s, const Minima& out, std::size_t from,
+/// The best match of each left pixel in [from, to); `ratio` and `margin` as in MatchJob.
+void searchLeft(const Strip& s, int ratio, int margin, const Minima& out, std::size_t from,
                 std::size_t to) {
     const D16 d16;
     const std::size_t n = hn::Lanes(d16);
@@ -297,11 +300,11 @@ void searchLeft(const MatchJob& job, const Strip& s, const Minima& out, std::siz
             }
         }
         bool ambiguous = false;
-        if (job.uniquenessMargin >= 0) {
+        if (margin >= 0) {
             // Lane minus (index - 1) wraps round: more than 2 means no neighbour of the minimum.
             const auto from1 = hn::Set(d16, static_cast<U16>(index - 1));
             const auto two = hn::Set(d16, U16{2});
-            const auto limit = hn::Set(d16, rivalLimit(job, best));
+            const auto limit = hn::Set(d16, rivalLimit(ratio, margin, best));
             for (std::size_t d = 0; d < s.depth; d += n) {
                 const auto away = hn::Sub(hn::Iota(d16, static_cast<U16>(d)), from1);
                 const auto rival =
@@ -314,6 +317,28 @@ void searchLeft(const MatchJob& job, const Strip& s, const Minima& out, std::siz
         out.ambiguous[x] = ambiguous ? 1 : 0;
         out.before[x] = cost[static_cast<std::ptrdiff_t>(index) - 1];
         out.after[x] = cost[index + 1];
+    }
+}
+
+/// The semi-global pass carries a match on along the row, also over surface that does not tell one
+/// disparity from another: flat or periodic. Marks as ambiguous what lies farther than anchorReach
+/// from every pixel whose window alone has the same minimum, every rival worse by the small
+/// penalty.
+void requireAnchors(const MatchJob& job, const Minima& own, const Minima& m) {
+    const auto width = static_cast<std::size_t>(job.width);
+    const auto reach = static_cast<std::size_t>(job.anchorReach);
+    std::size_t covered = static_cast<std::size_t>(job.firstColumn);  // decided before this column
+    for (std::size_t x = covered; x < width; ++x) {
+        if (own.ambiguous[x] != 0 || std::abs(own.index[x] - m.index[x]) > 1) {
+            continue;
+        }
+        for (; covered + reach < x; ++covered) {
+            m.ambiguous[covered] = 1;
+        }
+        covered = std::max(covered, x + reach + 1);
+    }
+    for (; covered < width; ++covered) {
+        m.ambiguous[covered] = 1;
     }
 }
 
@@ -370,15 +395,18 @@ void finishRow(const MatchJob& job, const Strip& s, const Minima& m, int row) {
 }
 
 void searchRow(const MatchJob& job, const Strip& s, int row) {
-    const Minima minima(s);
+    const Minima minima(s, s.best);
     const auto first = static_cast<std::size_t>(job.firstColumn);
     std::fill(s.rightBest, s.rightBest + s.width + s.stride, kWorst);
     std::fill(s.rightIndex, s.rightIndex + s.width + s.stride, kWorst);
     if (job.penaltyLarge > 0) {
         combineWindows(job, s, row, 0, s.width);
+        const Minima own(s, s.ownBest);
+        searchLeft(s, 0, job.anchorMargin, own, first, s.width);
         smoothAlong(job, s);
         searchRight(s, 0, s.width);
-        searchLeft(job, s, minima, first, s.width);
+        searchLeft(s, job.uniquenessRatio, job.uniquenessMargin, minima, first, s.width);
+        requireAnchors(job, own, minima);
     } else {
         // A few columns at a time, so that their costs are still in the first-level cache.
         const std::size_t step = std::max<std::size_t>(8, 8192 / s.stride / 8 * 8);
@@ -386,7 +414,8 @@ void searchRow(const MatchJob& job, const Strip& s, int row) {
             const std::size_t end = std::min(s.width, x + step);
             combineWindows(job, s, row, x, end);
             searchRight(s, x, end);
-            searchLeft(job, s, minima, std::max(x, first), end);
+            searchLeft(s, job.uniquenessRatio, job.uniquenessMargin, minima, std::max(x, first),
+                       end);
         }
     }
     finishRow(job, s, minima, row);
@@ -440,7 +469,7 @@ HWY_INLINE int weighted(const U16* at, const int (&weights)[N]) {
 }
 
 constexpr int kNarrow[] = {1, 2, 1};                         // sigma 0.7 px, sum 4
-constexpr int kWide[] = {7, 17, 32, 46, 52, 46, 32, 17, 7};  // sigma 2 px, sum 256
+constexpr int kWide[] = {4, 14, 31, 50, 58, 50, 31, 14, 4};  // sigma 1.75 px, sum 256
 constexpr int kReach = 4;
 
 void replicateRow(U16* row, int width) {
@@ -499,7 +528,8 @@ std::size_t scratchSize(const MatchJob& job) {
     const auto pad = static_cast<std::size_t>(job.halfWindow);
     const std::size_t windows =
         (width + 2 * pad) * depth + (2 * offset + 1) * (width + 2 * offset) * depth;
-    return windows + 3 * (kLanes + width * stride) + 2 * (width + stride) + 6 * (width + kLanes);
+    return windows + 3 * (kLanes + width * stride) + 2 * (width + stride) +
+           2 * 6 * (width + kLanes);
 }
 
 void matchRows(const MatchJob& job, int first, int last, std::uint16_t* scratch) {

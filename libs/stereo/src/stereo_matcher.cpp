@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "riftmap/stereo/stereo_matcher.h"
 
+#include "riftmap/stereo/disparity_filters.h"
 #include "riftmap/stereo/opencv_matchers.h"
 #include "riftmap/stereo/paper_matcher.h"
 
@@ -37,6 +38,12 @@ void StereoOptions::describe(OptionTable& table) {
               "Semi-global: cost of a step of 1 px, a pixel of the window.");
     table.add("penalty_large", penaltyLarge, 0.0, 60.0, "grey levels",
               "Semi-global: cost of a larger step, a pixel of the window.");
+    table.add("anchor_reach", anchorReach, 0, 1024, "px",
+              "Semi-global: how far a match is carried along the row beyond a pixel whose window "
+              "alone is sure of it.");
+    table.add("anchor_margin", anchorMargin, 0.0, 60.0, "grey levels",
+              "Semi-global: a window is sure of its match where every rival is worse by so much, a "
+              "pixel of the window; more than noise makes of it.");
     table.add("uniqueness_margin", uniquenessMargin, 0.0, 60.0, "grey levels",
               "Added to the share of uniqueness, a pixel of the window.");
     table.add("sharpness", sharpness, 0.0, 255.0, "grey levels",
@@ -55,9 +62,17 @@ void StereoOptions::describe(OptionTable& table) {
               "Groups of fewer pixels of similar disparity are discarded; 0 keeps all.");
     table.add("isolated_difference", isolatedDifference, 0.0, 16.0, "px",
               "Neighbours that differ by no more belong together.");
-    table.add("silhouette_reach", silhouetteReach, 0, 10, "px",
-              "Pixels so near to a farther surface are discarded: windows make silhouettes fatter; "
-              "0 keeps all.");
+    table.add(
+        "rim_texture", rimTexture, 0, 255, "grey levels",
+        "Matches at the rim of matched surface are discarded where their 3 x 3 pixels span no "
+        "more: flat background takes on the disparity of what is beside it. Four to five "
+        "times the noise of a sample, or 0: keeps all.");
+    table.add(
+        "silhouette_reach", silhouetteReach, 0, 10, "px",
+        "Pixels so few columns from a farther surface are discarded: windows make silhouettes "
+        "fatter; 0 keeps all.");
+    table.add("silhouette_rows", silhouetteRows, 0, kMaxSilhouetteRows, "px",
+              "The same up and down: there the left/right check does not help.");
     table.add("silhouette_step", silhouetteStep, 0.5, 64.0, "px",
               "Disparity by which a farther surface is lower, at least.");
     table.add("sigma_floor", sigmaFloor, 0.001, 10.0, "px",
@@ -65,6 +80,9 @@ void StereoOptions::describe(OptionTable& table) {
     table.add(
         "sigma_shape", sigmaShape, 0.0, 10.0, "px",
         "Growth of the standard deviation with the root of cost over curvature at the minimum.");
+    table.add("sigma_slope", sigmaSlope, 0.0, 10.0, "",
+              "Growth of the standard deviation with the change of disparity a pixel: windows mix "
+              "what they see.");
     table.add("image_noise", imageNoise, 0.0, 64.0, "grey levels",
               "Standard deviation of an image sample, for the sigma of OpenCV's matchers.");
     table.add("sigma_d", sigmaGiven, 0.001, 10.0, "px",

@@ -38,13 +38,19 @@ struct Contender {
 
 /// The settings of the table: those of the library, but for what is said here. OpenCV's matchers
 /// get a uniqueness of 10 % (the middle of the 5 .. 15 that its documentation advises; the
-/// `_5` and `_15` variants show both ends) and the same filter of isolated groups.
-std::vector<Contender> contenders() {
-    const auto paper = [](auto&& change) {
-        return [change](int n) -> std::unique_ptr<StereoMatcher> {
+/// `_5` and `_15` variants show both ends) and the same filter of isolated groups. `settings`
+/// ("Stereo.key=value") change ours.
+std::vector<Contender> contenders(const std::vector<std::string>& settings) {
+    const auto paper = [&settings](auto&& change) {
+        return [change, settings](int n) -> std::unique_ptr<StereoMatcher> {
             StereoOptions o;
             o.numDisparities = n;
             change(o);
+            OptionTable table;
+            o.describe(table);
+            for (const std::string& setting : settings) {
+                table.set(setting);
+            }
             return std::make_unique<PaperMatcher>(o);
         };
     };
@@ -71,13 +77,18 @@ std::vector<Contender> contenders() {
         o.prefilterGain = 1;
         o.prefilterCap = 31;
         o.truncation = 62;
+        o.window = 7;
+        o.sigmaFloor = 0.13;
     };
     return {{"paper", paper([](StereoOptions&) {})},
             {"paper_semi_global", paper(semiGlobal)},
             {"paper_dense", paper([semiGlobal](StereoOptions& o) {
                  semiGlobal(o);
+                 o.penaltySmall = 4;
+                 o.penaltyLarge = 30;
+                 o.anchorReach = 1000;
                  o.silhouetteReach = 0;
-                 o.uniqueness = 1;
+                 o.uniqueness = 0;
                  o.isolatedSize = 50;
              })},
             {"paper_one_window", paper([](StereoOptions& o) {
@@ -140,8 +151,8 @@ std::pair<cv::Mat, cv::Mat> timedPair(const std::string& folder) {
     return {left, right};
 }
 
-/// Integer arithmetic in the first-level cache, in eight parts that share nothing: how much a second
-/// thread can give on this machine.
+/// Integer arithmetic in the first-level cache, in eight parts that share nothing: how much a
+/// second thread can give on this machine.
 void computeOnly() {
     tbb::parallel_for(0, 8, [](int part) {
         std::array<std::uint16_t, 4096> values{};
@@ -272,7 +283,8 @@ double invented(const Pair& pair, const Contender& contender, int numDisparities
     return tooNear > 0 ? 100 * matched / tooNear : 0;
 }
 
-void scoreAll(const std::string& folder, const std::string& pictures, Figures& figures) {
+void scoreAll(const std::string& folder, const std::string& pictures, const std::string& only,
+              const std::vector<std::string>& settings, Figures& figures) {
     cv::setNumThreads(-1);
     for (const char* name : {"motorcycle", "aloe", "cones", "tsukuba"}) {
         const auto pair = loadPair(folder, name);
@@ -283,7 +295,10 @@ void scoreAll(const std::string& folder, const std::string& pictures, Figures& f
         std::printf("\n%-10s %-18s %7s %6s %6s %6s | %7s %6s %6s | %8s %8s %8s\n", name,
                     "(percent)", "matched", "bad1", "bad2", "mean", "matched", "bad1", "bad2",
                     "occluded", "residual", "too near");
-        for (const auto& contender : contenders()) {
+        for (const auto& contender : contenders(settings)) {
+            if (!only.empty() && contender.name != only) {
+                continue;
+            }
             DisparityImage found;
             contender.make(pair->numDisparities)->compute(pair->left, pair->right, found);
             const Score s = score(*pair, found);
@@ -309,25 +324,30 @@ std::string defaultData() {
 }
 
 int run(int argc, char** argv) {
-    std::string csv, pictures, folder = defaultData();
+    std::string csv, pictures, only, folder = defaultData();
     int rounds = 41;
     std::string part = "all";
+    std::vector<std::string> settings;
     for (int i = 1; i < argc; i += 2) {
         const std::string flag = argv[i];
         if (i + 1 == argc ||
             (flag != "--csv" && flag != "--data" && flag != "--pictures" && flag != "--rounds" &&
-             flag != "--part")) {
+             flag != "--part" && flag != "--only" && flag != "--set")) {
             std::cerr
                 << "bench-matcher [--csv FILE] [--data MIDDLEBURY_FOLDER] [--pictures FOLDER] "
-                   "[--rounds N] [--part all|times|scores]\n";
+                   "[--rounds N] [--part all|times|scores] [--only MATCHER] "
+                   "[--set Stereo.key=value]... (for the scores of ours)\n";
             return 2;
         }
         if (flag == "--rounds") {
             rounds = std::max(1, std::atoi(argv[i + 1]));
+        } else if (flag == "--set") {
+            settings.emplace_back(argv[i + 1]);
         } else {
             (flag == "--csv"    ? csv
              : flag == "--data" ? folder
              : flag == "--part" ? part
+             : flag == "--only" ? only
                                 : pictures) = argv[i + 1];
         }
     }
@@ -336,7 +356,7 @@ int run(int argc, char** argv) {
         timeAll(folder, rounds, figures);
     }
     if (part != "times") {
-        scoreAll(folder, pictures, figures);
+        scoreAll(folder, pictures, only, settings, figures);
     }
     return 0;
 }

@@ -87,7 +87,12 @@ Sample randomSample(std::mt19937_64& random) {
     o.subpixel = upTo(0, 4) != 0;
     o.isolatedSize = coin() ? 0 : upTo(1, 60);
     o.isolatedDifference = upTo(0, 8) * 0.25;
+    o.anchorReach = upTo(0, 12);
+    o.anchorMargin = upTo(0, 8) * 0.25;
+    o.rimTexture = coin() ? 0 : upTo(1, 160);
     o.silhouetteReach = upTo(0, 4);
+    o.silhouetteRows = upTo(0, 5);
+    o.sigmaSlope = coin() ? 0 : upTo(1, 8) * 0.2;
     o.silhouetteStep = upTo(2, 8) * 0.5;
     OptionTable table;
     o.describe(table);

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <functional>
+#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -61,7 +62,7 @@ Image prefiltered(const Image& image, const StereoOptions& o) {
         return image;
     }
     const std::vector<int> narrow = {1, 2, 1};
-    const std::vector<int> wide = {7, 17, 32, 46, 52, 46, 32, 17, 7};
+    const std::vector<int> wide = {4, 14, 31, 50, 58, 50, 31, 14, 4};
     Image out(image.width, image.height);
     for (int y = 0; y < image.height; ++y) {
         for (int x = 0; x < image.width; ++x) {
@@ -150,7 +151,7 @@ Layout layoutOf(const StereoOptions& o) {
     return {half, offset, (2 * half + 1) * (2 * half + 1) * (offset > 0 ? 3 : 1)};
 }
 
-Volume costs(const Image& left, const Image& right, const StereoOptions& o) {
+Volume windowCosts(const Image& left, const Image& right, const StereoOptions& o) {
     const auto [half, offset, pixels] = layoutOf(o);
     Volume single(left.width, left.height, o.numDisparities);
     forAll(single, [&](int x, int y, int i) {
@@ -176,16 +177,19 @@ Volume costs(const Image& left, const Image& right, const StereoOptions& o) {
             return window.at(x, y, i) + support[0] + support[1];
         });
     }
-    if (o.semiGlobal) {
-        const auto penalty = [&, n = pixels](double p) { return std::lround(p * n); };
-        const long large = std::max(1L, penalty(o.penaltyLarge));
-        Volume toRight = path(cost, 1, penalty(o.penaltySmall), large);
-        Volume toLeft = path(cost, -1, penalty(o.penaltySmall), large);
-        forAll(cost, [&](int x, int y, int i) {
-            return std::min(kWorst, toRight.at(x, y, i) + toLeft.at(x, y, i));
-        });
-    }
     return cost;
+}
+
+Volume semiGlobal(Volume& cost, const StereoOptions& o) {
+    const auto penalty = [&](double p) { return std::lround(p * layoutOf(o).pixels); };
+    const long large = std::max(1L, penalty(o.penaltyLarge));
+    Volume toRight = path(cost, 1, penalty(o.penaltySmall), large);
+    Volume toLeft = path(cost, -1, penalty(o.penaltySmall), large);
+    Volume sum = cost;
+    forAll(sum, [&](int x, int y, int i) {
+        return std::min(kWorst, toRight.at(x, y, i) + toLeft.at(x, y, i));
+    });
+    return sum;
 }
 
 /// Disparity index of the right pixel's best match over the whole row; -1: outside.
@@ -202,25 +206,51 @@ int bestOfRight(Volume& cost, int column, int y, const StereoOptions& o) {
     return best;
 }
 
-void matchPixel(Volume& cost, int x, int y, const StereoOptions& o, DisparityImage& out) {
+/// Index of the least cost, the lowest of equals.
+int bestOfLeft(Volume& cost, int x, int y) {
     int best = 0;
     for (int i = 1; i < cost.depth; ++i) {
         best = cost.at(x, y, i) < cost.at(x, y, best) ? i : best;
     }
-    if (best == 0 || best == cost.depth - 1) {
+    return best;
+}
+
+/// Another minimum that costs up to `share` percent and `margin` grey levels a pixel more.
+bool hasRival(Volume& cost, int x, int y, int best, int share, double margin,
+              const StereoOptions& o) {
+    const long least = cost.at(x, y, best);
+    const long limit =
+        least + least * (share * 65536 / 100) / 65536 + std::lround(margin * layoutOf(o).pixels);
+    for (int i = 0; i < cost.depth; ++i) {
+        if (std::abs(i - best) > 1 && cost.at(x, y, i) <= std::min(limit, kWorst - 1)) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/// Is there a pixel within reach along the row whose window alone has the minimum that the
+/// semi-global pass gave it, and no rival?
+bool hasAnchor(Volume& own, Volume& cost, int x, int y, int firstColumn, const StereoOptions& o) {
+    for (int u = std::max(firstColumn, x - o.anchorReach);
+         u <= std::min(own.width - 1, x + o.anchorReach); ++u) {
+        const int best = bestOfLeft(own, u, y);
+        if (!hasRival(own, u, y, best, 0, o.anchorMargin, o) &&
+            std::abs(best - bestOfLeft(cost, u, y)) <= 1) {
+            return true;
+        }
+    }
+    return false;
+}
+
+void matchPixel(Volume& cost, int x, int y, const StereoOptions& o, DisparityImage& out) {
+    const int best = bestOfLeft(cost, x, y);
+    if (best == 0 || best == cost.depth - 1 ||
+        (o.uniqueness > 0 && hasRival(cost, x, y, best, o.uniqueness, o.uniquenessMargin, o))) {
         return;
     }
     const int pixels = layoutOf(o).pixels;
     const long least = cost.at(x, y, best);
-    if (o.uniqueness > 0) {
-        const long limit = least + least * (o.uniqueness * 65536 / 100) / 65536 +
-                           std::lround(o.uniquenessMargin * pixels);
-        for (int i = 0; i < cost.depth; ++i) {
-            if (std::abs(i - best) > 1 && cost.at(x, y, i) <= std::min(limit, kWorst - 1)) {
-                return;
-            }
-        }
-    }
     const long before = cost.at(x, y, best - 1);
     const long after = cost.at(x, y, best + 1);
     const long curvature = before + after - 2 * least;
@@ -249,12 +279,15 @@ void matchPixel(Volume& cost, int x, int y, const StereoOptions& o, DisparityIma
 
 DisparityImage level(const Image& left, const Image& right, const StereoOptions& o,
                      int firstColumn) {
-    Volume cost = costs(prefiltered(left, o), prefiltered(right, o), o);
+    Volume own = windowCosts(prefiltered(left, o), prefiltered(right, o), o);
+    Volume cost = o.semiGlobal ? semiGlobal(own, o) : own;
     DisparityImage out;
     out.resize(left.width, left.height);
     for (int y = 0; y < left.height; ++y) {
         for (int x = firstColumn; x < left.width; ++x) {
-            matchPixel(cost, x, y, o, out);
+            if (!o.semiGlobal || hasAnchor(own, cost, x, y, firstColumn, o)) {
+                matchPixel(cost, x, y, o, out);
+            }
         }
     }
     return out;
@@ -333,12 +366,93 @@ void guard(const Image& left, const Image& right, const StereoOptions& o, Dispar
     }
 }
 
+/// Calls body(u, v) for the pixels of the image within reach of (x, y).
+void around(const DisparityImage& image, int x, int y, int reach,
+            const std::function<void(int, int)>& body) {
+    for (int v = std::max(0, y - reach); v <= std::min(image.height - 1, y + reach); ++v) {
+        for (int u = std::max(0, x - reach); u <= std::min(image.width - 1, x + reach); ++u) {
+            body(u, v);
+        }
+    }
+}
+
+void trimRims(const Image& grey, const StereoOptions& o, DisparityImage& image) {
+    if (o.rimTexture == 0) {
+        return;
+    }
+    const auto patch = [&](int x, int y) {
+        std::array<int, 9> values{};
+        for (int k = 0; k < 9; ++k) {
+            values.at(static_cast<std::size_t>(k)) = grey.at(x + k % 3 - 1, y + k / 3 - 1);
+        }
+        return values;
+    };
+    const auto flat = [&](int x, int y) {
+        const auto p = patch(x, y);
+        return *std::max_element(p.begin(), p.end()) - *std::min_element(p.begin(), p.end()) <=
+               o.rimTexture;
+    };
+    const auto mean = [&](int x, int y) {
+        const auto p = patch(x, y);
+        return std::accumulate(p.begin(), p.end(), 0) / 9.0;
+    };
+    const auto bare = [&](const DisparityImage& of, int u, int v) {
+        return u >= of.firstColumn && !of.valid(u, v);
+    };
+    DisparityImage before = image;
+    for (int y = 0; y < image.height; ++y) {
+        for (int x = 0; x < image.width; ++x) {
+            around(image, x, y, 3, [&](int u, int v) {
+                if (bare(before, u, v) && flat(x, y)) {
+                    image.disparity[image.index(x, y)] = kNoDisparity;
+                }
+            });
+        }
+    }
+    before = image;
+    for (int y = 0; y < image.height; ++y) {
+        for (int x = 0; x < image.width; ++x) {
+            around(image, x, y, 2, [&](int u, int v) {
+                if (bare(before, u, v) && flat(u, v) &&
+                    std::abs(grey.at(x, y) - mean(u, v)) <= o.rimTexture / 2.0 + 1e-9) {
+                    image.disparity[image.index(x, y)] = kNoDisparity;
+                }
+            });
+        }
+    }
+}
+
+void growSigma(DisparityImage& image, const StereoOptions& o) {
+    if (o.sigmaSlope <= 0) {
+        return;
+    }
+    for (int y = 0; y < image.height; ++y) {
+        for (int x = 0; x < image.width; ++x) {
+            if (!image.valid(x, y)) {
+                continue;
+            }
+            const std::array<std::pair<int, int>, 4> sides = {
+                {{x - 3, y}, {x + 3, y}, {x, y - 3}, {x, y + 3}}};
+            float steepest = 0;
+            for (const auto& [u, v] : sides) {
+                if (u >= 0 && v >= 0 && u < image.width && v < image.height && image.valid(u, v)) {
+                    steepest = std::max(steepest, std::abs(image.at(u, v) - image.at(x, y)));
+                }
+            }
+            const float more = steepest * (static_cast<float>(o.sigmaSlope) / 3.0F);
+            float& sigma = image.sigma[image.index(x, y)];
+            sigma = std::sqrt(sigma * sigma + more * more);
+        }
+    }
+}
+
 void discardSilhouettes(DisparityImage& image, const StereoOptions& o) {
     const DisparityImage before = image;
     const int r = o.silhouetteReach;
     for (int y = 0; y < image.height; ++y) {
         for (int x = 0; x < image.width; ++x) {
-            for (int v = std::max(0, y - r); v <= std::min(image.height - 1, y + r); ++v) {
+            for (int v = std::max(0, y - o.silhouetteRows);
+                 r > 0 && v <= std::min(image.height - 1, y + o.silhouetteRows); ++v) {
                 for (int u = std::max(0, x - r); u <= std::min(image.width - 1, x + r); ++u) {
                     if (before.valid(x, y) && before.valid(u, v) &&
                         before.at(x, y) - before.at(u, v) > static_cast<float>(o.silhouetteStep)) {
@@ -356,9 +470,12 @@ DisparityImage match(const cv::Mat& left, const cv::Mat& right, const StereoOpti
     const Image l = fromMat(left), r = fromMat(right);
     const int last = o.minDisparity + o.numDisparities - 1;
     DisparityImage out = level(l, r, o, std::clamp(last, 0, l.width));
+    out.firstColumn = std::clamp(last, 0, l.width);
     guard(l, r, o, out);
     removeIsolated(out, o.isolatedSize, static_cast<float>(o.isolatedDifference));
+    trimRims(l, o, out);
     discardSilhouettes(out, o);
+    growSigma(out, o);
     return out;
 }
 

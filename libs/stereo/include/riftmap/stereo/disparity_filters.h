@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <opencv2/core/mat.hpp>
 #include <vector>
 
 #include "riftmap/core/view.h"
@@ -44,10 +45,46 @@ class IsolatedFilter {
     Runs runs_;  ///< of the whole image
 };
 
+/// Largest `rows` of discardSilhouettes() [px].
+inline constexpr int kMaxSilhouetteRows = 12;
+
 /// Correlation windows make silhouettes fatter: background beside a near surface takes on its
-/// disparity. Discards each pixel that has another one within `reach` columns and rows whose
-/// disparity is lower by more than `step` [px]. `scratch` is kept from frame to frame by the
-/// caller.
-void discardSilhouettes(DisparityImage& image, int reach, float step, std::vector<float>& scratch);
+/// disparity. Discards each pixel that has another one within `reach` columns and `rows` rows
+/// (<= kMaxSilhouetteRows) whose disparity is lower by more than `step` [px]; reach 0: none.
+/// `scratch` is kept from frame to frame by the caller.
+void discardSilhouettes(DisparityImage& image, int reach, int rows, float step,
+                        std::vector<float>& scratch);
+
+/// A window that looks at a slope, an edge or a step mixes disparities: adds to each sigma, in
+/// squares, `slope` times the steepest change of disparity per pixel, taken over 3 px up, down,
+/// left and right where matched.
+void growSigmaWithSlope(DisparityImage& image, float slope);
+
+/// Takes matches off the rim of matched surface whose own pixels say nothing: see apply(). Keeps
+/// its buffers: one object is used by one thread at a time.
+class RimFilter {
+ public:
+    /// Beside a textured surface the window still holds some of its texture, so that flat
+    /// background (a plain wall, the sky) takes on the surface's disparity. `grey` (8 bit, the left
+    /// image) is flat at a pixel where its 3 x 3 neighbourhood spans no more than `texture` grey
+    /// levels. Discards
+    /// - flat pixels within 3 px of one without a match (columns before image.firstColumn do not
+    ///   count), then
+    /// - pixels within 2 px of one that is flat and without a match where the pixel itself differs
+    ///   from the mean of that neighbourhood by no more than half of `texture`.
+    /// texture <= 0: nothing is done.
+    void apply(const cv::Mat& grey, int texture, DisparityImage& image);
+
+ private:
+    using Bytes = std::vector<std::uint8_t>;
+
+    void measureTexture(const cv::Mat& grey, int texture);
+    void markBare(const DisparityImage& image);
+
+    Bytes flat_;                      ///< 1: flat
+    std::vector<std::uint16_t> sum_;  ///< of the 3 x 3 grey levels
+    Bytes bare_;                      ///< 1: no match, within the field of view
+    Bytes beside_;                    ///< 1: bare within 3 columns
+};
 
 }  // namespace riftmap

@@ -33,23 +33,28 @@ struct StereoOptions {
     int truncation = 30;            ///< largest difference that one pixel counts with [grey levels]
     bool supportingWindows = true;  ///< five small windows that share out the window
     bool semiGlobal = false;        ///< a semi-global pass along the row over the windows' costs
-    double penaltySmall = 1.2;      ///< of a step of 1 px [grey levels a pixel of the window]
-    double penaltyLarge = 8;        ///< of any larger step [grey levels a pixel of the window]
+    double penaltySmall = 3;        ///< of a step of 1 px [grey levels a pixel of the window]
+    double penaltyLarge = 20;       ///< of any larger step [grey levels a pixel of the window]
+    double anchorMargin = 2;        ///< by which rivals are worse there [grey levels a pixel]
+    int anchorReach = 24;  ///< how far the pass carries a match beyond what is sure by itself [px]
 
     int guard = 56;  ///< how far beyond the range nearer surfaces are looked for, coarsely [px]
     bool leftRightCheck = true;
     int leftRightTolerance = 2;   ///< largest difference of the two directions [px]
-    int uniqueness = 3;           ///< the second best minimum is at least so much worse [%]
+    int uniqueness = 1;           ///< the second best minimum is at least so much worse [%]
     double uniquenessMargin = 0;  ///< and by this [grey levels a pixel of the window]
     double sharpness = 0;         ///< least curvature of a minimum [grey levels a pixel]
     bool subpixel = true;
     int isolatedSize = 100;         ///< groups of fewer pixels are discarded; 0 keeps all [px]
     double isolatedDifference = 1;  ///< neighbours nearer than this belong together [px]
-    int silhouetteReach = 3;        ///< pixels so near to a farther surface are discarded [px]
+    int rimTexture = 0;             ///< 3 x 3 px that span no more are flat; 0: off [grey levels]
+    int silhouetteReach = 3;        ///< pixels so near to a farther surface are discarded [columns]
+    int silhouetteRows = 4;         ///< the same up and down [rows]
     double silhouetteStep = 4;      ///< what counts as farther: lower disparity by more [px]
 
-    double sigmaFloor = 0.16;  ///< least standard deviation of a disparity [px]
-    double sigmaShape = 0.22;  ///< its growth with cost over curvature at the minimum [px]
+    double sigmaFloor = 0.10;  ///< least standard deviation of a disparity [px]
+    double sigmaShape = 0.20;  ///< its growth with cost over curvature at the minimum [px]
+    double sigmaSlope = 0.6;   ///< its growth with the change of disparity from pixel to pixel
     double imageNoise = 2;     ///< standard deviation of a sample, for OpenCV's [grey levels]
     double sigmaGiven = 0.1;   ///< standard deviation of a given disparity [px]
 

@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "filter_kernel.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "filter_kernel.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace riftmap::kernel {
+namespace HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+using Lanes = hn::ScalableTag<float>;
+using One = hn::CappedTag<float, 1>;
+
+constexpr float kNone = std::numeric_limits<float>::infinity();
+
+/// Calls body(tag, i) for [first, last): whole vectors, then lane by lane.
+template <class Body>
+HWY_INLINE void along(std::size_t first, std::size_t last, const Body& body) {
+    const Lanes wide;
+    std::size_t i = first;
+    for (; i + hn::Lanes(wide) <= last; i += hn::Lanes(wide)) {
+        body(wide, i);
+    }
+    for (; i < last; ++i) {
+        body(One(), i);
+    }
+}
+
+void leastAlong(const float* d, std::size_t width, std::size_t reach, float* out) {
+    const std::size_t inner = std::min(reach, width);
+    const std::size_t end = width > reach ? std::max(inner, width - reach) : inner;
+    along(inner, end, [&](auto tag, std::size_t i) {
+        auto least = hn::LoadU(tag, d + i);
+        for (std::size_t k = 1; k <= reach; ++k) {
+            least = hn::Min(least, hn::Min(hn::LoadU(tag, d + i - k), hn::LoadU(tag, d + i + k)));
+        }
+        hn::StoreU(least, tag, out + i);
+    });
+    const auto border = [&](std::size_t i) {
+        const std::size_t first = i - std::min(i, reach);
+        out[i] = *std::min_element(d + first, d + std::min(width, i + reach + 1));
+    };
+    for (std::size_t i = 0; i < inner; ++i) {
+        border(i);
+    }
+    for (std::size_t i = end; i < width; ++i) {
+        border(i);
+    }
+}
+
+void discardAbove(const float* const* rows, std::size_t count, std::size_t width, float step,
+                  float* d) {
+    along(0, width, [&](auto tag, std::size_t i) {
+        auto least = hn::LoadU(tag, rows[0] + i);
+        for (std::size_t k = 1; k < count; ++k) {
+            least = hn::Min(least, hn::LoadU(tag, rows[k] + i));
+        }
+        const auto here = hn::LoadU(tag, d + i);
+        const auto above = hn::Gt(hn::Sub(here, least), hn::Set(tag, step));
+        hn::StoreU(hn::IfThenElse(above, hn::Set(tag, kNone), here), tag, d + i);
+    });
+}
+
+void growSigma(const float* d, const float* up, const float* down, std::size_t width, float slope,
+               float* sigma) {
+    const float perPixel = slope / static_cast<float>(kSlopeReach);
+    const auto grow = [&](auto tag, std::size_t i, const float* left, const float* right) {
+        const auto here = hn::LoadU(tag, d + i);
+        const auto none = hn::Set(tag, kNone);
+        auto steepest = hn::Zero(tag);
+        for (const float* side : {up + i, down + i, left, right}) {
+            const auto there = hn::LoadU(tag, side);
+            const auto change = hn::Abs(hn::Sub(there, here));
+            steepest = hn::Max(steepest, hn::IfThenElseZero(hn::Lt(there, none), change));
+        }
+        const auto own = hn::LoadU(tag, sigma + i);
+        const auto more = hn::Mul(steepest, hn::Set(tag, perPixel));
+        const auto grown = hn::Sqrt(hn::Add(hn::Mul(own, own), hn::Mul(more, more)));
+        hn::StoreU(hn::IfThenElse(hn::Lt(here, none), grown, own), tag, sigma + i);
+    };
+    const std::size_t inner = std::min(kSlopeReach, width);
+    const std::size_t end = width > kSlopeReach ? std::max(inner, width - kSlopeReach) : inner;
+    along(inner, end,
+          [&](auto tag, std::size_t i) { grow(tag, i, d + i - kSlopeReach, d + i + kSlopeReach); });
+    const auto border = [&](std::size_t i) {
+        grow(One(), i, i >= kSlopeReach ? d + i - kSlopeReach : d + i,
+             i + kSlopeReach < width ? d + i + kSlopeReach : d + i);
+    };
+    for (std::size_t i = 0; i < inner; ++i) {
+        border(i);
+    }
+    for (std::size_t i = end; i < width; ++i) {
+        border(i);
+    }
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace riftmap::kernel
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace riftmap::kernel {
+
+HWY_EXPORT(leastAlong);
+HWY_EXPORT(discardAbove);
+HWY_EXPORT(growSigma);
+
+void leastAlong(const float* d, std::size_t width, std::size_t reach, float* out) {
+    HWY_DYNAMIC_DISPATCH(leastAlong)(d, width, reach, out);
+}
+
+void discardAbove(const float* const* rows, std::size_t count, std::size_t width, float step,
+                  float* d) {
+    HWY_DYNAMIC_DISPATCH(discardAbove)(rows, count, width, step, d);
+}
+
+void growSigma(const float* d, const float* up, const float* down, std::size_t width, float slope,
+               float* sigma) {
+    HWY_DYNAMIC_DISPATCH(growSigma)(d, up, down, width, slope, sigma);
+}
+
+}  // namespace riftmap::kernel
+#endif

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Inner loops over the rows of a disparity image, chosen at run time for the machine's instruction
+// set; the same bytes with each of them. Infinity: no match.
+#pragma once
+
+#include <cstddef>
+
+namespace riftmap::kernel {
+
+/// out[i] = least of d within `reach` columns of i; both have `width` numbers.
+void leastAlong(const float* d, std::size_t width, std::size_t reach, float* out);
+
+/// d[i] = infinity where it exceeds by more than `step` the least of rows[k][i], k in [0, count).
+void discardAbove(const float* const* rows, std::size_t count, std::size_t width, float step,
+                  float* d);
+
+/// Distance at which growSigma() looks for slope [px].
+inline constexpr std::size_t kSlopeReach = 3;
+
+/// sigma[i]^2 += (slope times the steepest of the ways up, down, left and right)^2, over
+/// kSlopeReach pixels that are matched. `up`, `down`: the rows so far from the row `d`.
+void growSigma(const float* d, const float* up, const float* down, std::size_t width, float slope,
+               float* sigma);
+
+}  // namespace riftmap::kernel
