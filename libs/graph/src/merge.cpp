@@ -9,6 +9,7 @@
 
 #include "edge_kernel.h"
 #include "fuse_kernel.h"
+#include "merge_codes.h"
 #include "normals.h"
 #include "riftmap/core/parallel.h"
 #include "visibility.h"
@@ -46,33 +47,6 @@ void forEach(std::size_t n, std::size_t atOnce, F&& f) {
             f(i);
         }
     });
-}
-
-unsigned evidenceOf(std::uint8_t state) {
-    return (state & kEvidenceMask) >> kEvidenceShift;
-}
-std::uint8_t withEvidence(std::uint8_t state, unsigned evidence) {
-    return static_cast<std::uint8_t>((state & ~kEvidenceMask) |
-                                     (std::min(evidence, 7U) << kEvidenceShift));
-}
-
-std::uint16_t weightAt(std::uint16_t& slot) {
-    return std::atomic_ref<std::uint16_t>(slot).load(std::memory_order_relaxed);
-}
-
-/// Lowers the weight code stored at `slot`; safe while others do the same. True if it changed.
-bool lowerWeight(std::uint16_t& slot, std::uint16_t code) {
-    std::atomic_ref<std::uint16_t> ref(slot);
-    std::uint16_t old = ref.load(std::memory_order_relaxed);
-    for (;;) {
-        const std::uint16_t smaller = compact::smallerWeight(old, code);
-        if (smaller == old) {
-            return false;
-        }
-        if (ref.compare_exchange_weak(old, smaller, std::memory_order_relaxed)) {
-            return true;
-        }
-    }
 }
 
 }  // namespace

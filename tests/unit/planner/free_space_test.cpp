@@ -163,18 +163,21 @@ TEST(FreeSpace, theFrontierIsTheSkinOfWhatIsUnknown) {
 
 TEST(FreeSpace, surfaceThatWasSeenHasNoFrontierBehindIt) {
     const Eigen::AlignedBox3d box(Eigen::Vector3d(1, -0.5, -0.5), Eigen::Vector3d(4, 0.5, 0.5));
-    FreeSpace space(kBox, 0.1);
-    const View view = test::viewOf(lookAt({0, 0, 0}, {1, 0, 0}), test::wall(3.03));
-    space.carve(view, sensorOf(view), false);
-    std::vector<Eigen::Vector3d> wall;
-    for (double y = -1; y < 1; y += 0.02) {
-        for (double z = -1; z < 1; z += 0.02) {
-            wall.emplace_back(3.03, y, z);
+    for (const double at : {3.03, 3.06}) {  // before and behind the middle of its voxels
+        FreeSpace space(kBox, 0.1);
+        const View view = test::viewOf(lookAt({0, 0, 0}, {1, 0, 0}), test::wall(at));
+        space.carve(view, sensorOf(view), false);
+        std::vector<Eigen::Vector3d> wall;
+        for (double y = -1; y < 1; y += 0.02) {
+            for (double z = -1; z < 1; z += 0.02) {
+                wall.emplace_back(at, y, z);
+            }
         }
+        // Where the middles of the voxels were seen, only the surface itself tells them from space.
+        EXPECT_EQ(space.frontier(box).empty(), at < 3.05);
+        space.setSurface(wall);
+        EXPECT_TRUE(space.frontier(box).empty());
     }
-    EXPECT_FALSE(space.frontier(box).empty());  // until the surface is entered
-    space.setSurface(wall);
-    EXPECT_TRUE(space.frontier(box).empty());
 }
 
 }  // namespace
