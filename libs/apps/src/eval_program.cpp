@@ -80,6 +80,8 @@ YamlMap summaryOf(const CoverageReport& report) {
     out.set("error_p95_m", report.errorP95);
     out.set("error_mean_m", report.errorMean);
     out.set("explained", report.explained);
+    out.set("certificate_right", report.certificateRight);
+    out.set("certificate_verdicts", report.verdicts);
     return out;
 }
 
@@ -87,17 +89,24 @@ void addOctomap(const OctomapComparison& c, YamlMap& out) {
     out.set("octomap_resolution_m", c.resolution);
     out.set("octomap_views", c.views);
     out.set("octomap_occupied_voxels", c.occupied);
-    out.set("octomap_voxels_with_our_vertex", c.ours);
+    out.set("octomap_our_voxels", c.ours);
     out.set("octomap_surface_voxels", c.surfaceVoxels);
     out.set("octomap_coverage", c.octomapCoverage());
     out.set("octomap_our_coverage", c.ourCoverage());
+    out.set("octomap_our_coverage_by_vertices", c.vertexCoverage());
     out.set("octomap_coverage_within_a_voxel", c.octomapCoverageNear());
     out.set("octomap_our_coverage_within_a_voxel", c.ourCoverageNear());
-    out.set("octomap_surface_only_occupied", c.onlyOccupied);
-    out.set("octomap_surface_only_ours", c.onlyOurs);
-    out.set("octomap_surface_only_ours_carved_free", c.onlyOursFree);
-    out.set("octomap_occupied_without_vertex", c.occupiedWithoutVertex);
-    out.set("octomap_occupied_far_from_vertex", c.occupiedFarFromVertex);
+    out.set("octomap_only_occupied_clipped", c.onlyOccupiedClipped);
+    out.set("octomap_only_occupied_beside_ours", c.onlyOccupiedBeside);
+    out.set("octomap_only_occupied_missed", c.onlyOccupiedMissed);
+    out.set("octomap_only_ours_carved_free", c.onlyOursFree);
+    out.set("octomap_only_ours_unknown", c.onlyOursUnknown);
+    out.set("octomap_occupied_off_the_surface", c.occupiedOffSurface);
+    out.set("octomap_occupied_far_off_the_surface", c.occupiedFarOff);
+    out.set("octomap_ours_off_the_surface", c.oursOffSurface);
+    out.set("octomap_ours_far_off_the_surface", c.oursFarOff);
+    out.set("octomap_occupied_not_ours", c.occupiedNotOurs);
+    out.set("octomap_occupied_far_from_ours", c.occupiedFarFromOurs);
     out.set("octomap_vertices_in_free", c.verticesInFree);
     out.set("octomap_vertices_far_in_free", c.verticesFarInFree);
     out.set("octomap_vertices_in_unknown", c.verticesInUnknown);
@@ -123,13 +132,26 @@ void writeSamples(const fs::path& file, const CoverageJudge& judge,
     writePly(file, cloud, {hash});
 }
 
+TrueSurface observableSurface(const CoverageJudge& judge) {
+    TrueSurface out;
+    for (std::size_t i = 0; i < judge.samples().points.size(); ++i) {
+        if (judge.observable().observable[i] != 0) {
+            out.points.push_back(judge.samples().points[i]);
+            out.normals.push_back(judge.samples().normals[i]);
+        }
+    }
+    return out;
+}
+
 }  // namespace
 
 /// What is judged.
 struct EvalProgram::Map {
     std::vector<Eigen::Vector3f> points, normals;       ///< normals may be empty
+    MapSurface surface;                                 ///< for the cross-check; else empty
     std::optional<double> area;                         ///< [m^2]
     std::optional<std::vector<Eigen::Vector3f>> rifts;  ///< the certificate's places
+    std::vector<Eigen::Vector3f> verdicts;              ///< tears that it says no camera can close
 };
 
 void JudgeOptions::describe(OptionTable& table) {
@@ -169,6 +191,9 @@ EvalProgram::Map EvalProgram::readMap() const {
     Map out;
     const auto takeGraph = [&](const PixelGraph& graph) {
         out.area = graph.surfaceArea();
+        if (!rawlog_.empty()) {
+            out.surface = surfaceOf(graph);
+        }
         out.rifts.emplace();
         for (const Rift& rift : graph.rifts()) {
             for (const VertexId id : rift.vertices) {
@@ -197,26 +222,36 @@ EvalProgram::Map EvalProgram::readMap() const {
     if (out.points.empty()) {
         throw FileError(map_.string() + ": no vertices in it");
     }
+    if (out.surface.vertices.empty()) {
+        out.surface.vertices = out.points;
+    }
     const fs::path beside = map_.parent_path() / "rifts.csv";
-    if (!rifts_.empty()) {
-        out.rifts = readRifts(rifts_);
-    } else if (!out.rifts && fs::exists(beside)) {
-        out.rifts = readRifts(beside);
+    const fs::path table = rifts_.empty() && fs::exists(beside) ? beside : rifts_;
+    if (!table.empty()) {
+        Certificate certificate = readRifts(table);
+        if (!rifts_.empty() || !out.rifts) {
+            out.rifts = std::move(certificate.open);
+        }
+        out.verdicts = std::move(certificate.verdicts);
     }
     return out;
 }
 
-std::vector<Eigen::Vector3f> EvalProgram::readRifts(const fs::path& file) const {
+EvalProgram::Certificate EvalProgram::readRifts(const fs::path& file) {
     const CsvTable table = readCsv(file);
-    std::vector<Eigen::Vector3f> out;
+    Certificate out;
     try {
         const std::size_t state = table.column("state");
         const std::size_t x = table.column("x");
         const std::size_t y = table.column("y");
         const std::size_t z = table.column("z");
         for (const auto& row : table.rows) {
+            const Eigen::Vector3f place(std::stof(row[x]), std::stof(row[y]), std::stof(row[z]));
             if (row[state] != "resolved") {
-                out.emplace_back(std::stof(row[x]), std::stof(row[y]), std::stof(row[z]));
+                out.open.push_back(place);
+            }
+            if (row[state] == "unreachable" || row[state] == "unobservable") {
+                out.verdicts.push_back(place);
             }
         }
     } catch (const std::logic_error& e) {
@@ -245,17 +280,23 @@ void EvalProgram::run() {
         viewSpaceOf(platform.limits(), platform.camera(), platform.pose().translation), eval_);
     meshArea = judge.meshArea();
     mapArea = map.area;
-    report = judge.evaluate(map.points, map.normals, map.rifts ? &*map.rifts : nullptr);
+    report =
+        judge.evaluate(map.points, map.normals, map.rifts ? &*map.rifts : nullptr, map.verdicts);
+    VoxelOwners owners;
     std::optional<OctomapCheck> voxels;
     if (!rawlog_.empty()) {
-        voxels = check(map, judge);
+        const TrueSurface truth = observableSurface(judge);
+        voxels = check(map, truth, judge.headline());
+        owners = voxels->owners(map.surface, truth);
     }
-    write(map, judge, platform, directory, voxels ? &*voxels : nullptr);
+    write(map, judge, platform, directory, owners);
     print();
 }
 
-OctomapCheck EvalProgram::check(const Map& map, const CoverageJudge& judge) {
-    OctomapCheck check(judge_.octomapResolution > 0 ? judge_.octomapResolution : judge.headline());
+OctomapCheck EvalProgram::check(const Map& map, const TrueSurface& truth, double headline) {
+    // Off the places where walls of worlds made by hand lie: by no simple part of a voxel.
+    const Eigen::Vector3f shift(0.37F, 0.41F, 0.43F);
+    OctomapCheck check(judge_.octomapResolution > 0 ? judge_.octomapResolution : headline, shift);
     RawlogReader reader(rawlog_, input_);
     ViewBuilder builder(stereo_);
     Progress bar("into OctoMap", "views", reader.expectedViews(), progress());
@@ -264,19 +305,13 @@ OctomapCheck EvalProgram::check(const Map& map, const CoverageJudge& judge) {
         check.insert(builder.build(*observation));
         bar.update(++done);
     }
-    std::vector<Eigen::Vector3f> surface;
-    for (std::size_t i = 0; i < judge.samples().points.size(); ++i) {
-        if (judge.observable().observable[i] != 0) {
-            surface.push_back(judge.samples().points[i]);
-        }
-    }
-    octomap = check.compare(map.points, surface);
+    octomap = check.compare(map.surface, truth);
     return check;
 }
 
 void EvalProgram::write(const Map& map, const CoverageJudge& judge,
                         const SimulatedPlatform& platform, const RunDirectory& directory,
-                        const OctomapCheck* voxels) {
+                        const VoxelOwners& owners) {
     YamlMap summary;
     summary.set("world", platform.world().name);
     char hash[32];
@@ -311,8 +346,8 @@ void EvalProgram::write(const Map& map, const CoverageJudge& judge,
         const CoveragePictures pictures(judge, platform.world().mesh, platform.rayCaster(),
                                         map.points, map.normals);
         pictures.write(directory.path(), judge.vertexErrors(map.points));
-        if (voxels != nullptr) {
-            pictures.writeOwners(directory.path(), voxels->owners(map.points));
+        if (owners) {
+            pictures.writeOwners(directory.path(), owners);
         }
     }
 }
@@ -338,17 +373,28 @@ void EvalProgram::print() const {
     if (!std::isnan(report.explained)) {
         std::printf("uncovered and explained by a rift: %.2f%%\n", 100 * report.explained);
     }
+    if (report.verdicts > 0) {
+        std::printf("tears called unreachable or unobservable: %zu, rightly %.2f%%\n",
+                    report.verdicts, 100 * report.certificateRight);
+    }
     if (octomap) {
         const OctomapComparison& c = *octomap;
+        const auto part = [&](std::size_t n) {
+            return 100.0 * static_cast<double>(n) / static_cast<double>(c.surfaceVoxels);
+        };
         std::printf(
-            "OctoMap at %s, %zu views: surface voxels occupied %.2f%%, with a vertex of ours "
-            "%.2f%% (within a voxel: %.2f%%, %.2f%%)\n"
-            "  occupied without a vertex: %zu of %zu (none next to it either: %zu); "
-            "vertices in free voxels: %zu of %zu (nothing occupied next to it: %zu)\n",
-            deltaName(c.resolution).c_str(), c.views, 100 * c.octomapCoverage(),
-            100 * c.ourCoverage(), 100 * c.octomapCoverageNear(), 100 * c.ourCoverageNear(),
-            c.occupiedWithoutVertex, c.occupied, c.occupiedFarFromVertex, c.verticesInFree,
-            c.vertices, c.verticesFarInFree);
+            "OctoMap at %s, %zu views, %zu surface voxels: occupied %.2f%%, our surface in it "
+            "%.2f%% (a vertex of ours %.2f%%; within a voxel: %.2f%%, %.2f%%)\n"
+            "  only OctoMap's: clipped by the surface %.2f%%, ours beside it %.2f%%, missed by us "
+            "%.2f%%; only ours: carved free by later rays %.2f%%, unknown to it %.2f%%\n"
+            "  off the surface (and not beside it): %zu (%zu) of %zu occupied voxels, %zu (%zu) of "
+            "%zu of ours; vertices in free voxels %zu of %zu (nothing occupied beside them: %zu)\n",
+            deltaName(c.resolution).c_str(), c.views, c.surfaceVoxels, 100 * c.octomapCoverage(),
+            100 * c.ourCoverage(), 100 * c.vertexCoverage(), 100 * c.octomapCoverageNear(),
+            100 * c.ourCoverageNear(), part(c.onlyOccupiedClipped), part(c.onlyOccupiedBeside),
+            part(c.onlyOccupiedMissed), part(c.onlyOursFree), part(c.onlyOursUnknown),
+            c.occupiedOffSurface, c.occupiedFarOff, c.occupied, c.oursOffSurface, c.oursFarOff,
+            c.ours, c.verticesInFree, c.vertices, c.verticesFarInFree);
     }
 }
 

@@ -299,12 +299,16 @@ YamlMap ExploreRun::figures(const std::string& error) {
     }
     if (judge_ && !history_.empty()) {
         std::vector<Eigen::Vector3f> rims;
+        std::vector<Eigen::Vector3f> verdicts;
         for (const auto& [key, r] : explorer_->knowledge().ledger().records()) {
             if (r.state != RiftState::kResolved) {
                 rims.push_back(r.cell.openPosition);
             }
+            if (r.state == RiftState::kUnreachable || r.state == RiftState::kUnobservable) {
+                verdicts.push_back(r.cell.openPosition);
+            }
         }
-        program_.coverage = judge_->evaluate(points_, normals_, &rims);
+        program_.coverage = judge_->evaluate(points_, normals_, &rims, verdicts);
         for (const DistanceFigures& f : program_.coverage.at) {
             const std::string d = deltaName(f.delta);
             summary.set("c_obs_" + d, f.cObs);
@@ -318,6 +322,8 @@ YamlMap ExploreRun::figures(const std::string& error) {
         summary.set("error_median_m", program_.coverage.errorMedian);
         summary.set("error_p95_m", program_.coverage.errorP95);
         summary.set("explained", program_.coverage.explained);
+        summary.set("certificate_right", program_.coverage.certificateRight);
+        summary.set("certificate_verdicts", program_.coverage.verdicts);
         CoverageCurve curve;
         for (const StepFigures& f : history_) {
             curve.add(f.step.pathLength, f.coverage[headlineIndex()].cObs);

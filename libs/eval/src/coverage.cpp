@@ -16,7 +16,8 @@ namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
-constexpr double kReach = 0.05;  ///< from an uncovered sample to the next, and to a rift [m]
+constexpr double kReach = 0.05;   ///< from an uncovered sample to the next, and to a rift [m]
+constexpr double kBeside = 0.03;  ///< from a tear to what one could still see there [m]
 
 struct Distances {
     std::vector<double> deltas;
@@ -175,7 +176,8 @@ std::vector<std::uint8_t> CoverageJudge::strictlyCovered(std::span<const Eigen::
 
 CoverageReport CoverageJudge::evaluate(std::span<const Eigen::Vector3f> vertices,
                                        std::span<const Eigen::Vector3f> normals,
-                                       const std::vector<Eigen::Vector3f>* rifts) const {
+                                       const std::vector<Eigen::Vector3f>* rifts,
+                                       const std::vector<Eigen::Vector3f>& verdicts) const {
     CoverageReport report;
     report.headline = headline_;
     report.samples = samples_.points.size();
@@ -220,18 +222,22 @@ CoverageReport CoverageJudge::evaluate(std::span<const Eigen::Vector3f> vertices
         report.errorMedian = quantile(errors, 0.5);
         report.errorP95 = quantile(errors, 0.95);
     }
+    // One must be able to step from sample to sample: farther where they are sparse.
+    const double step = 2 * std::sqrt(meshArea_ / static_cast<double>(report.samples));
+    const std::vector<float> distances = sampleDistances(vertices);
     if (rifts != nullptr) {
-        // One must be able to step from sample to sample: farther where they are sparse.
-        const double spacing = std::sqrt(meshArea_ / static_cast<double>(report.samples));
-        report.explained = explainedShare(sampleDistances(vertices), headline_, *rifts,
-                                          std::max(kReach, 2 * spacing));
+        report.explained = explainedShare(distances, headline_, *rifts, std::max(kReach, step));
     }
+    report.verdicts = verdicts.size();
+    const auto right = trueVerdicts(distances, headline_, verdicts, std::max(kBeside, step));
+    report.certificateRight =
+        share(static_cast<std::size_t>(std::count(right.begin(), right.end(), 1)), right.size());
     return report;
 }
 
-double CoverageJudge::explainedShare(const std::vector<float>& sampleDistances, double delta,
-                                     const std::vector<Eigen::Vector3f>& rifts,
-                                     double reach) const {
+/// The observable samples farther than delta from the map.
+std::vector<Eigen::Vector3f> CoverageJudge::stillToSee(const std::vector<float>& sampleDistances,
+                                                       double delta) const {
     const auto limit = coverageLimit(delta);
     std::vector<Eigen::Vector3f> open;
     for (std::size_t i = 0; i < sampleDistances.size(); ++i) {
@@ -239,6 +245,27 @@ double CoverageJudge::explainedShare(const std::vector<float>& sampleDistances, 
             open.push_back(samples_.points[i]);
         }
     }
+    return open;
+}
+
+std::vector<std::uint8_t> CoverageJudge::trueVerdicts(const std::vector<float>& sampleDistances,
+                                                      double delta,
+                                                      const std::vector<Eigen::Vector3f>& places,
+                                                      double reach) const {
+    const std::vector<Eigen::Vector3f> open = stillToSee(sampleDistances, delta);
+    const auto radius = static_cast<float>(reach);
+    const PointIndex index(open, radius);
+    std::vector<std::uint8_t> out;
+    for (const Eigen::Vector3f& place : places) {
+        out.push_back(index.nearest(place, radius) ? 0 : 1);
+    }
+    return out;
+}
+
+double CoverageJudge::explainedShare(const std::vector<float>& sampleDistances, double delta,
+                                     const std::vector<Eigen::Vector3f>& rifts,
+                                     double reach) const {
+    const std::vector<Eigen::Vector3f> open = stillToSee(sampleDistances, delta);
     if (open.empty()) {
         return 1;
     }

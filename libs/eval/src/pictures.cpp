@@ -25,8 +25,20 @@ const cv::Vec3d kCovered(95, 170, 85);
 const cv::Vec3d kUncovered(40, 45, 225);
 const cv::Vec3d kUnobservable(190, 165, 150);
 const cv::Vec3d kFaint(225, 225, 225);
-const cv::Vec3d kOnlyOctomap(210, 120, 40);
-const cv::Vec3d kOnlyOurs(40, 150, 245);
+
+/// Colour and words for each VoxelOwner but kBoth and kNeither.
+struct OwnerStyle {
+    VoxelOwner owner;
+    cv::Vec3d colour;
+    const char* text;
+};
+const OwnerStyle kOwnerStyles[] = {
+    {VoxelOwner::kOctomapClipped, {230, 190, 120}, "only OctoMap's: the surface clips a corner"},
+    {VoxelOwner::kOctomapBeside, {210, 120, 40}, "only OctoMap's: ours runs beside it"},
+    {VoxelOwner::kOctomapMissed, {130, 20, 120}, "only OctoMap's: we have nothing near"},
+    {VoxelOwner::kOursCarved, {40, 150, 245}, "only ours: OctoMap's rays carved it"},
+    {VoxelOwner::kOursUnknown, {30, 200, 250}, "only ours: no ray of OctoMap's was there"},
+};
 
 cv::Vec3b shaded(const cv::Vec3d& colour, double shade) {
     const cv::Vec3d c = colour * (0.45 + 0.55 * shade);
@@ -42,10 +54,11 @@ cv::Vec3d heat(double deltas) {
     return stops[i] * (1 - (t - i)) + stops[i + 1] * (t - i);
 }
 
+/// In a band of its own above the picture.
 void legend(cv::Mat& picture, const std::vector<std::pair<cv::Vec3d, std::string>>& entries) {
-    cv::rectangle(picture, cv::Rect(6, 8, 420, 22 * static_cast<int>(entries.size()) + 6),
-                  cv::Scalar(255, 255, 255), cv::FILLED);
-    int y = 14;
+    cv::copyMakeBorder(picture, picture, 22 * static_cast<int>(entries.size()) + 12, 0, 0, 0,
+                       cv::BORDER_CONSTANT, cv::Scalar(255, 255, 255));
+    int y = 8;
     for (const auto& [colour, text] : entries) {
         cv::rectangle(picture, cv::Rect(12, y, 22, 14), cv::Scalar(colour[0], colour[1], colour[2]),
                       cv::FILLED);
@@ -256,36 +269,33 @@ cv::Mat CoveragePictures::errors(std::size_t viewpoint, std::span<const float> v
     return picture;
 }
 
-cv::Mat CoveragePictures::owners(std::size_t viewpoint,
-                                 const std::function<VoxelOwner(const Eigen::Vector3f&)>& ownerOf,
-                                 int width, int height) const {
+cv::Mat CoveragePictures::owners(std::size_t viewpoint, const VoxelOwners& ownerOf, int width,
+                                 int height) const {
     cv::Mat picture = paint(eyes_.at(viewpoint), width, height, nullptr, [&](const Seen& seen) {
         if (!seen.observable) {
             return shaded(kUnobservable, seen.shade);
         }
-        switch (ownerOf(seen.point.cast<float>())) {
-            case VoxelOwner::kBoth:
-                return shaded(kFaint, seen.shade);
-            case VoxelOwner::kOnlyOctomap:
-                return shaded(kOnlyOctomap, seen.shade);
-            case VoxelOwner::kOnlyOurs:
-                return shaded(kOnlyOurs, seen.shade);
-            case VoxelOwner::kNeither:
-                break;
+        const VoxelOwner owner = ownerOf(seen.point.cast<float>());
+        if (owner == VoxelOwner::kBoth) {
+            return shaded(kFaint, seen.shade);
         }
-        return shaded(kUncovered, seen.shade);
+        const auto* const style =
+            std::find_if(std::begin(kOwnerStyles), std::end(kOwnerStyles),
+                         [&](const OwnerStyle& s) { return s.owner == owner; });
+        return shaded(style == std::end(kOwnerStyles) ? kUncovered : style->colour, seen.shade);
     });
-    legend(picture, {{kFaint, "voxel of both"},
-                     {kOnlyOctomap, "only OctoMap's"},
-                     {kOnlyOurs, "only ours"},
-                     {kUncovered, "of neither"},
-                     {kUnobservable, "not observable"}});
+    std::vector<std::pair<cv::Vec3d, std::string>> entries = {{kFaint, "voxel of both"}};
+    for (const OwnerStyle& style : kOwnerStyles) {
+        entries.emplace_back(style.colour, style.text);
+    }
+    entries.emplace_back(kUncovered, "of neither");
+    entries.emplace_back(kUnobservable, "not observable");
+    legend(picture, entries);
     return picture;
 }
 
-void CoveragePictures::writeOwners(
-    const std::filesystem::path& directory,
-    const std::function<VoxelOwner(const Eigen::Vector3f&)>& ownerOf) const {
+void CoveragePictures::writeOwners(const std::filesystem::path& directory,
+                                   const VoxelOwners& ownerOf) const {
     for (std::size_t i = 0; i < viewpoints(); ++i) {
         writePng(directory / ("octomap_" + std::to_string(i) + ".png"), owners(i, ownerOf));
     }

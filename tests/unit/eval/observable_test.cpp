@@ -4,9 +4,11 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 
+#include "riftmap/eval/coverage.h"
 #include "shapes.h"
 
 namespace riftmap {
@@ -43,6 +45,33 @@ TEST_F(RoomSpace, EverythingButTheFloorUnderTheBoxIsObservable) {
         ASSERT_EQ(set.observable[i] != 0, !under) << p.transpose();
         ASSERT_GT(set.normals[i].dot(samples.normals[i]), 0) << "seen from the front only";
     }
+}
+
+TEST_F(RoomSpace, VerdictsAreTrueWhereNothingIsLeftToSee) {
+    // The map has everything observable but a patch of the wall x = 0.
+    options_.samples = 100000;
+    const RayCaster caster(mesh_);
+    const CoverageJudge judge(mesh_, caster, space_, options_);
+    std::vector<Eigen::Vector3f> map;
+    for (std::size_t i = 0; i < judge.samples().points.size(); ++i) {
+        const Eigen::Vector3f& p = judge.samples().points[i];
+        const bool patch = p.x() < 1e-4F && p.y() > 1 && p.y() < 2 && p.z() > 0.5F && p.z() < 1.5F;
+        if (judge.observable().observable[i] != 0 && !patch) {
+            map.push_back(p);
+        }
+    }
+    const std::vector<Eigen::Vector3f> places = {
+        {2.5F, 1.5F, 0},   // under the box: uncovered, but no one can see it
+        {2, 1.5F, 0},      // its rim
+        {0, 1.5F, 1},      // in the patch
+        {0, 1.5F, 1.49F},  // at the patch's rim, inside
+        {0, 1.5F, 1.7F}};  // on the wall beside
+    const auto right = judge.trueVerdicts(judge.sampleDistances(map), 0.02, places);
+    EXPECT_EQ(right, (std::vector<std::uint8_t>{1, 1, 0, 0, 1}));
+    const CoverageReport report = judge.evaluate(map, {}, nullptr, places);
+    EXPECT_EQ(report.verdicts, 5U);
+    EXPECT_DOUBLE_EQ(report.certificateRight, 0.6);
+    EXPECT_TRUE(std::isnan(judge.evaluate(map, {}).certificateRight)) << "nothing was claimed";
 }
 
 TEST_F(RoomSpace, TheSideSeenDecidesTheNormal) {

@@ -43,12 +43,17 @@ class EvalProgram : public Program {
 
  private:
     struct Map;
+    /// Places of a certificate [m].
+    struct Certificate {
+        std::vector<Eigen::Vector3f> open;      ///< all tears that are not resolved
+        std::vector<Eigen::Vector3f> verdicts;  ///< those called unreachable or unobservable
+    };
 
     Map readMap() const;
-    std::vector<Eigen::Vector3f> readRifts(const std::filesystem::path& file) const;
-    OctomapCheck check(const Map& map, const CoverageJudge& judge);
+    static Certificate readRifts(const std::filesystem::path& file);
+    OctomapCheck check(const Map& map, const TrueSurface& truth, double headline);
     void write(const Map& map, const CoverageJudge& judge, const SimulatedPlatform& platform,
-               const RunDirectory& directory, const OctomapCheck* voxels);
+               const RunDirectory& directory, const VoxelOwners& owners);
     void print() const;
 
     SimulationOptions simulation_;

@@ -44,6 +44,10 @@ struct CoverageReport {
     /// Share of the uncovered observable samples that the listed rifts explain; NaN without a list,
     /// 1 where nothing is uncovered.
     double explained = std::numeric_limits<double>::quiet_NaN();
+    /// Share of the verdicts "no camera can close this tear" that are true (trueVerdicts());
+    /// NaN without such verdicts.
+    double certificateRight = std::numeric_limits<double>::quiet_NaN();
+    std::size_t verdicts = 0;  ///< their number
 
     /// The figures at this distance. Throws std::out_of_range if it was not asked for.
     const DistanceFigures& atDelta(double delta) const;
@@ -84,9 +88,11 @@ class CoverageJudge {
 
     /// Everything. `normals`: of the vertices, or empty. `rifts`: places on the rims that the
     /// certificate lists (rift vertices or centres) [m]; null where there is no certificate.
+    /// `verdicts`: centres of the tears that it calls unreachable or unobservable [m].
     CoverageReport evaluate(std::span<const Eigen::Vector3f> vertices,
                             std::span<const Eigen::Vector3f> normals,
-                            const std::vector<Eigen::Vector3f>* rifts = nullptr) const;
+                            const std::vector<Eigen::Vector3f>* rifts = nullptr,
+                            const std::vector<Eigen::Vector3f>& verdicts = {}) const;
 
     /// Distance of every sample to the nearest vertex [m], infinite beyond the largest delta.
     std::vector<float> sampleDistances(std::span<const Eigen::Vector3f> vertices) const;
@@ -96,8 +102,16 @@ class CoverageJudge {
     /// comes within `reach` of a rift, walking over such samples at most `reach` apart.
     double explainedShare(const std::vector<float>& sampleDistances, double delta,
                           const std::vector<Eigen::Vector3f>& rifts, double reach = 0.05) const;
+    /// A tear that no camera can close has nothing beside it that one could still see: 1 for each
+    /// place without a sample within `reach` [m] of it that is observable but farther than `delta`
+    /// from the map, else 0. (Observable: some pose of the view space sees it.)
+    std::vector<std::uint8_t> trueVerdicts(const std::vector<float>& sampleDistances, double delta,
+                                           const std::vector<Eigen::Vector3f>& places,
+                                           double reach = 0.03) const;
 
  private:
+    std::vector<Eigen::Vector3f> stillToSee(const std::vector<float>& sampleDistances,
+                                            double delta) const;
     std::vector<std::uint8_t> strictlyCovered(std::span<const Eigen::Vector3f> vertices,
                                               std::span<const Eigen::Vector3f> normals,
                                               double delta) const;

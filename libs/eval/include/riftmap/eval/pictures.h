@@ -19,7 +19,7 @@ namespace riftmap {
 
 /// Pictures of a judgement. Surfaces that turn their seen side away are left out, so that one looks
 /// into a room through its ceiling and its nearer walls; so are, of a building, the outsides that
-/// no one could see.
+/// no one could see. A legend stands above each, beyond the height asked for.
 class CoveragePictures {
  public:
     /// `vertices` and `normals` (or empty) of the map; everything given must outlive the pictures.
@@ -39,15 +39,13 @@ class CoveragePictures {
     cv::Mat errors(std::size_t viewpoint, std::span<const float> vertexErrors, int width = 960,
                    int height = 720) const;
 
-    /// The observable surface by who has its voxel: both light grey, only the OctoMap blue, only we
-    /// orange, neither red. 8-bit BGR.
-    cv::Mat owners(std::size_t viewpoint,
-                   const std::function<VoxelOwner(const Eigen::Vector3f&)>& ownerOf,
-                   int width = 960, int height = 720) const;
+    /// The observable surface by who has its voxel, and if only one has it, why (the legend tells
+    /// the colours). 8-bit BGR.
+    cv::Mat owners(std::size_t viewpoint, const VoxelOwners& ownerOf, int width = 960,
+                   int height = 720) const;
 
     /// octomap_N.png into the directory.
-    void writeOwners(const std::filesystem::path& directory,
-                     const std::function<VoxelOwner(const Eigen::Vector3f&)>& ownerOf) const;
+    void writeOwners(const std::filesystem::path& directory, const VoxelOwners& ownerOf) const;
     /// coverage_N.png and error_N.png into the directory.
     void write(const std::filesystem::path& directory, std::span<const float> vertexErrors) const;
 
