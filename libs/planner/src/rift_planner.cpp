@@ -21,7 +21,7 @@ ViewScorer::Weights weightsFor(const Knowledge& k) {
     if (k.surfaceBox()) {
         // Unseen surface counts where it may be (the frontier), so the rims of the surface seen
         // stand for holes that are smaller than that, and coarse surface is mostly covered. Both
-        // so that gains come true: predicted against measured on four objects.
+        // so that gains come true: predicted against measured on two objects.
         weights.reach = 0.4;
         weights.coarse = 0.15;
     }
