@@ -11,6 +11,8 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
+#include "vector_tail-inl.h"
+
 HWY_BEFORE_NAMESPACE();
 namespace riftmap::HWY_NAMESPACE {
 namespace {
@@ -104,17 +106,17 @@ void projectOf(const Page& page, const Projection& in, ProjectedPage& out) {
 void reachOf(const ReachRow& in, float* most) {
     const auto step = static_cast<int>(hn::Lanes(d));
     for (int c = 0; c < in.width; c += step) {
-        const auto there = hn::FirstN(d, static_cast<std::size_t>(std::min(step, in.width - c)));
-        const V z = hn::MaskedLoad(there, d, in.z + c);
+        const int left = in.width - c;
+        const V z = loadSome(d, in.z + c, left);
         V gate = set(in.gamma);
         if (!in.gammaOnly) {  // gateOf
             const V blur = hn::Mul(set(kBlur), hn::Mul(z, set(in.footprint)));
-            const V stretch = hn::Max(set(1.0F), hn::MaskedLoad(there, d, in.stretch + c));
-            const V noise = hn::Mul(set(kNoiseGate), hn::MaskedLoad(there, d, in.sigma + c));
+            const V stretch = hn::Max(set(1.0F), loadSome(d, in.stretch + c, left));
+            const V noise = hn::Mul(set(kNoiseGate), loadSome(d, in.sigma + c, left));
             gate = hn::Max(gate, hn::Max(noise, hn::Mul(blur, stretch)));
         }
         const V reach = hn::IfThenElseZero(hn::Gt(z, hn::Zero(d)), hn::Add(z, gate));
-        hn::BlendedStore(hn::Max(reach, hn::MaskedLoad(there, d, most + c)), there, d, most + c);
+        storeSome(hn::Max(reach, loadSome(d, most + c, left)), d, most + c, left);
     }
 }
 

@@ -10,6 +10,8 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
+#include "vector_tail-inl.h"
+
 HWY_BEFORE_NAMESPACE();
 namespace riftmap::HWY_NAMESPACE {
 namespace {
@@ -30,17 +32,11 @@ HWY_INLINE V set(float x) {
 HWY_INLINE int lanes() {
     return static_cast<int>(hn::Lanes(d));
 }
-/// Up to a vector of values; zeros beyond `left`.
 HWY_INLINE V load(const float* from, int left) {
-    return left >= lanes() ? hn::LoadU(d, from)
-                           : hn::MaskedLoad(hn::FirstN(d, static_cast<std::size_t>(left)), d, from);
+    return loadSome(d, from, left);
 }
 HWY_INLINE void store(V v, float* to, int left) {
-    if (left >= lanes()) {
-        hn::StoreU(v, d, to);
-    } else {
-        hn::BlendedStore(v, hn::FirstN(d, static_cast<std::size_t>(left)), d, to);
-    }
+    storeSome(v, d, to, left);
 }
 
 std::size_t depthsOf(const DepthRow& in) {
@@ -241,12 +237,7 @@ void anglesOf(const AngleRow& in, std::uint8_t* onPlane) {
               left);
         const auto flag = hn::IfThenElseZero(hn::RebindMask(di, on), hn::Set(di, 1));
         const auto bytes = hn::DemoteTo(d8, flag);
-        if (left >= lanes()) {
-            hn::StoreU(bytes, d8, onPlane + c);
-        } else {
-            hn::BlendedStore(bytes, hn::FirstN(d8, static_cast<std::size_t>(left)), d8,
-                             onPlane + c);
-        }
+        storeSome(bytes, d8, onPlane + c, left);
     }
 }
 
@@ -301,12 +292,7 @@ void edgesOf(const EdgeRow& in) {
         const auto code = hn::IfThenElse(hn::RebindMask(di, both), flagged,
                                          hn::Set(di, std::int32_t{ViewPoints::kNoEdge}));
         const auto narrow = hn::DemoteTo(d16, code);
-        if (left >= lanes()) {
-            hn::StoreU(narrow, d16, in.code + c);
-        } else {
-            hn::BlendedStore(narrow, hn::FirstN(d16, static_cast<std::size_t>(left)), d16,
-                             in.code + c);
-        }
+        storeSome(narrow, d16, in.code + c, left);
     }
 }
 

@@ -17,6 +17,7 @@
 #include <string>
 #include <vector>
 
+#include "astar_comparison.h"
 #include "riftmap/graph/pixel_graph.h"
 #include "synthetic_views.h"
 
@@ -232,6 +233,20 @@ void queries(const PixelGraph& graph, Report& report) {
     }
 }
 
+/// Paths through a map of a million vertices; false if the lengths differ.
+bool searches(Report& report) {
+    PixelGraph graph;
+    synthetic::growTo(graph, 1'000'000);
+    const riftmap::AstarComparison c = riftmap::compareAstar(graph, 20);
+    report.add("astar_vertices", static_cast<double>(graph.vertexCount()), "1");
+    report.add("astar_ms_median", c.ownMs, "ms");
+    report.add("astar_boost_ms_median", c.boostMs, "ms");
+    report.add("astar_time_ratio_boost", c.ratio, "1");
+    report.add("astar_length_difference", c.largestDifference, "1");
+    report.add("astar_unreachable", static_cast<double>(c.unreachable), "1");
+    return c.largestDifference < 1e-9;
+}
+
 /// What memory can deliver: reads and writes of large arrays by two threads [GB/s].
 double bandwidth() {
     std::vector<std::uint64_t> data(std::size_t{32} << 20U, 1);
@@ -314,7 +329,12 @@ int main(int argc, char** argv) {
     if (octomapViews > 0) {
         againstOctoMap(scene, report, octomapViews);
     }
+    const bool sameLengths = searches(report);
     report.add("bandwidth_gb_per_s", bandwidth(), "GB/s");
+    if (!sameLengths) {
+        std::cerr << "bench-graph: A* and Boost.Graph differ in the lengths of shortest paths\n";
+        return 1;
+    }
     if (!csv.empty() && !report.write(csv)) {
         std::cerr << "bench-graph: cannot write " << csv << '\n';
         return 1;

@@ -28,14 +28,20 @@ struct TestGraph {
         }
     }
     void connect(VertexId a, VertexId b, float factor) {
-        // Rounded up: never below the straight distance.
-        const float w = (points[a] - points[b]).norm() * factor * 1.00001F;
+        const float w = (points[a] - points[b]).norm() * factor;
         edges[a].push_back({b, w});
         edges[b].push_back({a, w});
     }
 };
 
-/// Random points joined to some near ones, with detours; falls into several parts.
+/// Of an edge: its weight, but at least the straight distance.
+double lengthOf(const TestGraph& g, VertexId from, const TestGraph::Edge& e) {
+    const Eigen::Vector3d a = g.points[from].cast<double>(), b = g.points[e.to].cast<double>();
+    return std::max(static_cast<double>(e.weight), (a - b).norm());
+}
+
+/// Random points joined to some near ones, with detours and with weights below the straight
+/// distance, as merging leaves them; falls into several parts.
 TestGraph randomGraph(std::mt19937& random, std::size_t n) {
     TestGraph g;
     std::uniform_real_distribution<float> coordinate(0, 1);
@@ -47,7 +53,7 @@ TestGraph randomGraph(std::mt19937& random, std::size_t n) {
     for (VertexId a = 0; a < n; ++a) {
         for (VertexId b = a + 1; b < n; ++b) {
             if ((g.points[a] - g.points[b]).norm() < reach && coordinate(random) < 0.7F) {
-                g.connect(a, b, 1.0F + coordinate(random));
+                g.connect(a, b, 0.2F + 1.8F * coordinate(random));
             }
         }
     }
@@ -61,7 +67,7 @@ std::vector<double> boostDistances(const TestGraph& g, VertexId source) {
     Boost graph(g.points.size());
     for (VertexId a = 0; a < g.idLimit(); ++a) {
         for (const auto& e : g.edges[a]) {
-            boost::add_edge(a, e.to, static_cast<double>(e.weight), graph);
+            boost::add_edge(a, e.to, lengthOf(g, a, e), graph);
         }
     }
     std::vector<double> distance(g.points.size());
@@ -76,7 +82,7 @@ double lengthOf(const TestGraph& g, const std::vector<VertexId>& path) {
     for (std::size_t i = 1; i < path.size(); ++i) {
         double best = std::numeric_limits<double>::infinity();
         for (const auto& e : g.edges[path[i - 1]]) {
-            best = e.to == path[i] ? std::min(best, static_cast<double>(e.weight)) : best;
+            best = e.to == path[i] ? std::min(best, lengthOf(g, path[i - 1], e)) : best;
         }
         sum += best;
     }

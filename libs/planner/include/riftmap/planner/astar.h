@@ -7,6 +7,7 @@
 #include <limits>
 #include <optional>
 #include <stdexcept>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -17,7 +18,7 @@ namespace riftmap {
 /// A way through the graph.
 struct GraphPath {
     std::vector<VertexId> vertices;  ///< source first, goal last
-    double length = 0;               ///< sum of the weights [m]
+    double length = 0;               ///< sum of its edges' lengths [m]; see GraphSearch
 };
 
 /// Shortest paths through large graphs (paper sec. VIII.B): A* with the straight line to the goal
@@ -28,9 +29,10 @@ struct GraphPath {
 /// from those of earlier ones by a stamp, so a search touches memory only where it goes: buffers
 /// are as large as the largest map searched and are never cleared.
 ///
-/// The path is the shortest one if no weight is below the straight distance of its ends. Where
-/// merging has left smaller weights (the smallest ever observed counts) it is a good one: each
-/// vertex is expanded once, whatever the weights. Equal lengths are broken by the smaller id, so
+/// The length of an edge is its weight, but never less than the straight distance of its ends as
+/// they lie now: weights are the smallest ever observed, and fusion moves vertices on. With that
+/// the straight line to the goal is a consistent heuristic on merged maps too, so the path is the
+/// shortest one and each vertex is expanded once. Equal lengths are broken by the smaller id, so
 /// the result does not depend on anything but the graph. An object serves one thread.
 class GraphSearch {
  public:
@@ -38,10 +40,8 @@ class GraphSearch {
     template <class Graph>
     std::optional<GraphPath> shortestPath(const Graph& graph, VertexId source, VertexId goal) {
         const Eigen::Vector3d end = graph.position(goal).template cast<double>();
-        const auto straight = [&](VertexId id) {
-            return (graph.position(id).template cast<double>() - end).norm();
-        };
-        begin(graph.idLimit(), source, straight(source));
+        const auto straight = [&end](const Eigen::Vector3d& p) { return (p - end).norm(); };
+        begin(graph.idLimit(), source, straight(graph.position(source).template cast<double>()));
         while (!heap_.empty()) {
             const VertexId id = pop();
             if (id == goal) {
@@ -60,7 +60,7 @@ class GraphSearch {
     std::vector<double> distances(const Graph& graph, VertexId source,
                                   const std::vector<VertexId>& targets) {
         begin(graph.idLimit(), source, 0.0);
-        const auto none = [](VertexId) { return 0.0; };
+        const auto none = [](const Eigen::Vector3d&) { return 0.0; };
         std::vector<VertexId> left = targets;
         std::sort(left.begin(), left.end());
         left.erase(std::unique(left.begin(), left.end()), left.end());
@@ -139,15 +139,19 @@ class GraphSearch {
     template <class Graph, class Heuristic>
     void relaxEdges(const Graph& graph, VertexId id, const Heuristic& heuristic) {
         const double base = nodes_[id].distance;
+        const Eigen::Vector3d here = graph.position(id).template cast<double>();
         graph.forEachEdge(id, [&](VertexId to, float weight) {
             Node& node = nodes_[to];
-            if (node.stamp == closedStamp()) {
-                return;  // never again: weights below the straight distance would reopen for ever
+            const double least = base + static_cast<double>(weight);
+            if (node.stamp == closedStamp() ||
+                (node.stamp == openStamp() && !(least < node.distance))) {
+                return;
             }
-            const double distance = base + static_cast<double>(weight);
+            const Eigen::Vector3d there = graph.position(to).template cast<double>();
+            const double distance = std::max(least, base + (there - here).norm());
             if (node.stamp != openStamp() || distance < node.distance) {
                 node = {distance, id, openStamp()};
-                push({distance + heuristic(to), to});
+                push({distance + heuristic(there), to});
             }
         });
     }

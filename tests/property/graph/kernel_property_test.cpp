@@ -1,0 +1,392 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Each piece of vector code against the formula it stands for, and against itself on every
+// instruction set. A failure prints its seed.
+#include <gtest/gtest.h>
+#include <hwy/targets.h>
+
+#include <cmath>
+#include <map>
+#include <set>
+#include <sstream>
+
+#include "association.h"
+#include "edge_kernel.h"
+#include "fuse_kernel.h"
+#include "random_scenes.h"
+#include "riftmap/graph/pixel_graph.h"
+
+namespace riftmap {
+namespace {
+
+/// A view of an odd size, so that vectors and patches do not fit, with noise of its own.
+View oddView(Random& random, const Scene& scene) {
+    const int width = 41 + random.below(40);
+    Eigen::Vector3d eye = random.point(1.0);
+    eye.x() += eye.x() < 0 ? -0.8 : 0.8;
+    const double sigma = random.below(3) == 0 ? 0.0 : random.in(0.02, 0.3);
+    View view = synthetic::makeView(scene, synthetic::smallCamera(width, width * 3 / 4 + 1),
+                                    lookAt(eye, random.point(0.4)),
+                                    {sigma, static_cast<std::uint64_t>(random.below(1 << 30))});
+    for (int i = 0; i < 60; ++i) {
+        view.disparity.disparity[static_cast<std::size_t>(
+            random.below(static_cast<int>(view.disparity.disparity.size())))] = kNoDisparity;
+    }
+    return view;
+}
+
+TEST(GraphKernels, GiveTheSameMapOnEveryInstructionSet) {
+    for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+        SCOPED_TRACE("seed " + std::to_string(seed));
+        std::map<std::int64_t, std::string> maps;
+        for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
+            hwy::SetSupportedTargetsForTest(target);
+            Random random(seed);
+            const Scene scene = randomScene(random);
+            PixelGraph graph(randomOptions(random));
+            for (int i = 0; i < 4; ++i) {
+                graph.merge(oddView(random, scene));
+            }
+            std::ostringstream out;
+            graph.save(out);
+            maps[target] = out.str();
+        }
+        hwy::SetSupportedTargetsForTest(0);
+        EXPECT_GT(maps.begin()->second.size(), 50'000U);
+        for (const auto& [target, bytes] : maps) {
+            EXPECT_TRUE(bytes == maps.begin()->second) << hwy::TargetName(target);
+        }
+    }
+}
+
+/// Least squares by the normal equations, in double, as the text describes it.
+struct SlowPlane {
+    bool known = false;
+    double a = 0, b = 0, value = 0;
+    double nearestToTolerance = 1e9;  ///< how close a pixel came to the limit of belonging
+};
+SlowPlane slowPlane(const View& view, const ViewPoints& points, int column, int row) {
+    SlowPlane plane;
+    const std::size_t centre = points.index(column, row);
+    if (column >= points.width || !(points.z[centre] > 0)) {
+        return plane;
+    }
+    const double sd = view.disparity.sigma[centre];
+    const double d0 = points.disparity[centre];
+    const bool noisy = points.sigma[centre] > 0.25F * points.z[centre] * points.footprint;
+    const int step = noisy ? 3 : 1;
+    double tolerance = 4 * sd + 10.0 * points.fb / (points.fx * points.z[centre]) * 2 * step;
+    for (int pass = 0; pass < 2; ++pass) {
+        Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+        Eigen::Vector3d right = Eigen::Vector3d::Zero();
+        for (int dr = -2 * step; dr <= 2 * step; dr += step) {
+            for (int dc = -2 * step; dc <= 2 * step; dc += step) {
+                const int c = column + dc, r = row + dr;
+                if (c < 0 || r < 0 || c >= points.width || r >= points.height ||
+                    !(points.z[points.index(c, r)] > 0)) {
+                    continue;
+                }
+                const double d = points.disparity[points.index(c, r)] - d0;
+                const double off =
+                    std::abs(d - (plane.value + plane.a * dc + plane.b * dr)) - tolerance;
+                plane.nearestToTolerance = std::min(plane.nearestToTolerance, std::abs(off));
+                if (off <= 0) {
+                    const Eigen::Vector3d x(dc, dr, 1);
+                    normal += x * x.transpose();
+                    right += x * d;
+                }
+            }
+        }
+        const double n = normal(2, 2);
+        const Eigen::Matrix2d spread =
+            normal.topLeftCorner<2, 2>() - normal.topRightCorner<2, 1>() *
+                                               normal.topRightCorner<2, 1>().transpose() /
+                                               std::max(n, 1.0);
+        if (n < 9 || spread.determinant() <= 1e-3 * n * n) {
+            plane.known = false;
+            return plane;
+        }
+        const Eigen::Vector3d solved = normal.ldlt().solve(right);
+        plane.a = solved[0];
+        plane.b = solved[1];
+        plane.value = solved[2];
+        tolerance = 3 * sd + 0.05;
+        plane.known = true;
+    }
+    plane.value += d0;
+    return plane;
+}
+
+TEST(GraphKernels, PatchesAreLeastSquaresPlanes) {
+    std::size_t planes = 0, none = 0;
+    for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+        SCOPED_TRACE("seed " + std::to_string(seed));
+        Random random(seed);
+        const Scene scene = randomScene(random);
+        const View view = oddView(random, scene);
+        ViewPoints points;
+        points.build(view, randomOptions(random));
+        for (int r = 0; r < points.height; r += 4) {
+            for (int c = 0; c < points.width; c += 4) {
+                const PatchPlane& fast = points.patch(c, r);
+                const SlowPlane slow = slowPlane(view, points, c + 2, fast.row);
+                if (slow.nearestToTolerance < 1e-3) {
+                    continue;  // rounding decides what belongs
+                }
+                ASSERT_EQ(fast.tolerance >= 0, slow.known) << c << ' ' << r;
+                if (!slow.known) {
+                    ++none;
+                    continue;
+                }
+                ++planes;
+                const double scale = 1e-3 + 1e-3 * std::abs(slow.a) + 1e-3 * std::abs(slow.b);
+                EXPECT_NEAR(fast.slopeColumn, slow.a, scale);
+                EXPECT_NEAR(fast.slopeRow, slow.b, scale);
+                EXPECT_NEAR(fast.value, slow.value, 5 * scale);
+                // n . X = distance for points of the plane, n towards the camera.
+                const Eigen::Vector3d n = fast.normal.cast<double>();
+                EXPECT_NEAR(n.norm(), 1.0, 1e-5);
+                for (const auto& [dc, dr] : {std::pair{0, 0}, {3, 1}, {-2, 4}}) {
+                    const double d = slow.value + slow.a * dc + slow.b * dr;
+                    if (d > 0.5) {
+                        const double z = static_cast<double>(points.fb) / d;
+                        const Eigen::Vector3d p((c + 2 + dc - static_cast<double>(points.cx)) * z /
+                                                    static_cast<double>(points.fx),
+                                                (fast.row + dr - static_cast<double>(points.cy)) *
+                                                    z / static_cast<double>(points.fy),
+                                                z);
+                        EXPECT_NEAR(-n.dot(p) * fast.inverseDistance, 1.0, 0.01);
+                    }
+                }
+            }
+        }
+    }
+    EXPECT_GT(planes, 500U);
+    EXPECT_GT(none, 20U);
+}
+
+TEST(GraphKernels, EdgesAndKindsAreThoseOfEquation3) {
+    for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+        SCOPED_TRACE("seed " + std::to_string(seed));
+        Random random(seed);
+        const Scene scene = randomScene(random);
+        const GraphOptions options = randomOptions(random);
+        View view = oddView(random, scene);
+        view.disparity.firstColumn = random.below(6);
+        ViewPoints points;
+        points.build(view, options);
+        std::size_t valid = 0;
+        for (int r = 0; r < points.height; ++r) {
+            for (int c = 0; c < points.width; ++c) {
+                const std::size_t i = points.index(c, r);
+                const double d = view.disparity.at(c, r), sd = view.disparity.sigma[i];
+                const double fb = view.camera.fx * view.camera.baseline;
+                const bool known = std::isfinite(d) && d > 0 && 3 * sd < d;
+                ASSERT_EQ(points.z[i] > 0, known);
+                if (!known) {
+                    continue;
+                }
+                ++valid;
+                EXPECT_NEAR(points.z[i], fb / d, 1e-5 * fb / d);
+                EXPECT_NEAR(points.sigma[i], fb / d / d * sd, 1e-5);
+                unsigned kinds = 0;
+                for (const auto& [dc, dr] : {std::pair{1, 0}, {0, 1}, {-1, 0}, {0, -1}}) {
+                    const int c2 = c + dc, r2 = r + dr;
+                    if (c2 < 0 || r2 < 0 || c2 >= points.width || r2 >= points.height) {
+                        kinds |= kImageBorder;
+                        continue;
+                    }
+                    const std::size_t j = points.index(c2, r2);
+                    const std::uint16_t code = dc > 0   ? points.right[i]
+                                               : dr > 0 ? points.down[i]
+                                               : dc < 0 ? points.right[j]
+                                                        : points.down[j];
+                    ASSERT_EQ(code == ViewPoints::kNoEdge, !(points.z[j] > 0));
+                    if (code == ViewPoints::kNoEdge) {
+                        kinds |= c2 < view.disparity.firstColumn ? kImageBorder : kNoMatch;
+                        continue;
+                    }
+                    const double weight =
+                        (points.inCamera(c, r, points.z[i]) - points.inCamera(c2, r2, points.z[j]))
+                            .cast<double>()
+                            .norm();
+                    EXPECT_NEAR(compact::weightOf(code), weight, 6e-4 * weight + 2e-6);
+                    const bool high = (code & compact::kHighBit) != 0;
+                    kinds |= high ? unsigned{kDepthStep} : 0U;
+                    if (options.delta > 0 && std::abs(weight - options.delta) > 1e-5) {
+                        EXPECT_EQ(high, weight > options.delta);
+                    } else if (high) {  // never without a reason; the angle may explain others
+                        EXPECT_GT(weight, options.targetResolution);
+                    }
+                }
+                EXPECT_EQ(points.kinds[i],
+                          options.typedOpenness ? kinds : kinds & unsigned{kDepthStep});
+            }
+        }
+        EXPECT_EQ(points.validCount, valid);
+    }
+}
+
+TEST(GraphKernels, ProjectionIsEquation4) {
+    for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+        SCOPED_TRACE("seed " + std::to_string(seed));
+        Random random(seed);
+        const Scene scene = randomScene(random);
+        const GraphOptions options = randomOptions(random);
+        PixelGraph graph(options);
+        for (int i = 0; i < 2; ++i) {
+            graph.merge(oddView(random, scene));
+        }
+        const View view = oddView(random, scene);
+        ViewPoints points;
+        points.build(view, options);
+        Association fast;
+        fast.project(graph.storage(), points, options);
+        const Pose toCamera = view.world_T_camera.inverse();
+        std::set<VertexId> seen;
+        for (std::uint32_t k = 0; k < fast.candidateCount(); ++k) {
+            if (!fast.inView(k)) {
+                continue;
+            }
+            const VertexId id = fast.idOf(k);
+            ASSERT_TRUE(graph.alive(id));
+            seen.insert(id);
+            const Eigen::Vector3d p = toCamera * Eigen::Vector3d(graph.position(id).cast<double>());
+            const Eigen::Vector2d px = view.camera.project(p);
+            const Candidate candidate = fast.candidate(k);
+            EXPECT_NEAR(candidate.z, p.z(), 1e-5);
+            EXPECT_NEAR(candidate.u, px.x(), 2e-3);
+            EXPECT_NEAR(candidate.v, px.y(), 2e-3);
+            EXPECT_EQ(candidate.sigma, graph.vertex(id).sigma);
+        }
+        // What is left out lies outside, or behind everything within two tiles.
+        double farthest = 0;
+        for (std::size_t i = 0; i < points.z.size(); ++i) {
+            farthest = std::max<double>(
+                farthest,
+                points.z[i] > 0 ? points.z[i] + Association::gate(points, i, options).depth : 0.0F);
+        }
+        graph.forEachVertex([&](VertexId id) {
+            const Eigen::Vector3d p = toCamera * Eigen::Vector3d(graph.position(id).cast<double>());
+            const Eigen::Vector2d px = view.camera.project(p);
+            const double reach =
+                farthest + kNoiseGate * static_cast<double>(graph.vertex(id).sigma);
+            const bool inside = p.z() > 0.02 && px.x() > 0 && px.y() > 0 &&
+                                px.x() < points.width - 1 && px.y() < points.height - 1;
+            if (seen.count(id) == 0 && inside && p.z() < reach) {
+                // Only a view of something nearer there can hide it.
+                const int c = static_cast<int>(std::lround(px.x()));
+                const int r = static_cast<int>(std::lround(px.y()));
+                EXPECT_GT(p.z(), points.z[points.index(c, r)]) << "vertex " << id;
+            }
+        });
+    }
+}
+
+TEST(GraphKernels, FusionIsByInverseVariance) {
+    std::size_t fused = 0, turned = 0;
+    for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+        SCOPED_TRACE("seed " + std::to_string(seed));
+        Random random(seed);
+        const Scene scene = randomScene(random);
+        ViewPoints points;
+        points.build(oddView(random, scene), GraphOptions{});
+        std::vector<std::uint32_t> pixels;
+        for (std::uint32_t i = 0; i < points.z.size(); ++i) {
+            if (points.z[i] > 0) {
+                pixels.push_back(i);
+            }
+        }
+        Page page{};
+        PageFusion fusion;
+        std::array<float, Page::kSize> sigma{};
+        for (std::uint32_t s = 0; s < Page::kSize; ++s) {
+            page.x[s] = static_cast<float>(random.in(-2, 2));
+            page.y[s] = static_cast<float>(random.in(-2, 2));
+            page.z[s] = static_cast<float>(random.in(-2, 2));
+            sigma[s] = static_cast<float>(random.in(0, 0.02));
+            page.normal[s] =
+                random.below(8) == 0 ? 0 : compact::encodeDirection(random.point(1).cast<float>());
+            fusion.pixel[s] =
+                pixels[static_cast<std::size_t>(random.below(static_cast<int>(pixels.size())))];
+            fusion.matched |= std::uint64_t{random.below(4) != 0} << s;
+        }
+        fusion.before = sigma.data();
+        const Page old = page;
+        fuseMatched(points, page, fusion);
+        for (std::uint32_t s = 0; s < Page::kSize; ++s) {
+            if (((fusion.matched >> s) & 1U) == 0) {
+                EXPECT_EQ(page.position(s), old.position(s));
+                EXPECT_EQ(page.sigma[s], old.sigma[s]);
+                EXPECT_EQ(page.normal[s], old.normal[s]);
+                EXPECT_EQ((fusion.moved >> s) & 1U, 0U);
+                continue;
+            }
+            ++fused;
+            const std::uint32_t i = fusion.pixel[s];
+            const int c = static_cast<int>(i) % points.width,
+                      r = static_cast<int>(i) / points.width;
+            const double a = std::max<double>(sigma[s], kTinySigma);
+            const double b = std::max<double>(points.sigma[i], kLeastSigma);
+            const double gain = a * a / (a * a + b * b);
+            const Eigen::Vector3f step = (points.inMap(c, r) - old.position(s)) * float(gain);
+            EXPECT_LT((page.position(s) - old.position(s) - step).norm(), 1e-5F);
+            EXPECT_NEAR(compact::Sigma::decode(page.sigma[s]), 1 / std::hypot(1 / a, 1 / b), 1e-5);
+            const double spacing = static_cast<double>(points.z[i] * points.footprint);
+            const bool noisy = points.sigma[i] > 0.25F * points.z[i] * points.footprint;
+            if (noisy && points.onPatch(c, r)) {
+                ++turned;
+                const Eigen::Vector3f mixed =
+                    float(1 - gain) * compact::decodeDirection(old.normal[s]) +
+                    float(gain) * (points.rotation * points.patch(c, r).normal);
+                EXPECT_LT((compact::decodeDirection(page.normal[s]) - mixed.normalized()).norm(),
+                          1e-3F);
+            } else {
+                EXPECT_EQ(page.normal[s], old.normal[s]);
+            }
+            if (std::abs(step.norm() - 0.02 * spacing) > 1e-6) {
+                EXPECT_EQ(((fusion.moved >> s) & 1U) != 0, !noisy && step.norm() > 0.02 * spacing);
+            }
+        }
+    }
+    EXPECT_GT(fused, 200U);
+    EXPECT_GT(turned, 20U);
+}
+
+TEST(GraphKernels, ListedEdgesAreThoseBetweenDifferentVerticesNotBothNew) {
+    for (std::uint64_t seed = 1; seed <= 50; ++seed) {
+        SCOPED_TRACE("seed " + std::to_string(seed));
+        Random random(seed);
+        const auto count = static_cast<std::size_t>(1 + random.below(100));
+        const auto ahead = static_cast<std::size_t>(1 + random.below(20));
+        const std::size_t all = count + ahead + kEdgePadding;
+        std::vector<VertexId> vertex(all);
+        std::vector<std::uint8_t> fresh(all);
+        std::vector<std::uint16_t> code(all);
+        for (std::size_t i = 0; i < all; ++i) {
+            vertex[i] = static_cast<VertexId>(random.below(5));
+            fresh[i] = static_cast<std::uint8_t>(random.below(2));
+            code[i] = random.below(4) == 0 ? ViewPoints::kNoEdge
+                                           : static_cast<std::uint16_t>(random.below(0xFFFF));
+        }
+        std::vector<VertexId> a(all), b(all);
+        std::vector<std::uint32_t> c(all);
+        const std::size_t n = listEdges({vertex.data(), fresh.data(), code.data(), count, ahead},
+                                        a.data(), b.data(), c.data());
+        std::size_t k = 0;
+        for (std::size_t i = 0; i < count; ++i) {
+            if (code[i] == ViewPoints::kNoEdge || vertex[i] == vertex[i + ahead] ||
+                (fresh[i] != 0 && fresh[i + ahead] != 0)) {
+                continue;
+            }
+            ASSERT_LT(k, n);
+            EXPECT_EQ(a[k], vertex[i]);
+            EXPECT_EQ(b[k], vertex[i + ahead]);
+            EXPECT_EQ(c[k], code[i]);
+            ++k;
+        }
+        EXPECT_EQ(k, n);
+    }
+}
+
+}  // namespace
+}  // namespace riftmap
