@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 
 #include "filter_kernel.h"
@@ -32,39 +31,23 @@ void IsolatedFilter::unite(Runs& runs, std::uint32_t a, std::uint32_t b) {
 }
 
 void IsolatedFilter::findRuns(const DisparityImage& image, int row, float maxDifference,
-                              Runs& runs) {
+                              Strip& strip) {
+    const auto width = static_cast<std::size_t>(image.width);
+    strip.ends.resize(width + kernel::kEndsRoom + 1);
     const float* d = image.disparity.data() + image.index(0, row);
-    int first = -1;  // of the run that is open
-    const auto close = [&](int end) {
-        if (first >= 0) {
-            runs.push_back({.row = row,
-                            .first = first,
-                            .last = end,
-                            .group = static_cast<std::uint32_t>(runs.size()),
-                            .size = static_cast<std::uint32_t>(end - first)});
-        }
-        first = -1;
-    };
-    // Where something begins or ends, 64 columns at a time and without branches. Infinity differs
-    // by more than any limit, also from itself.
-    float before = kNoDisparity;
-    for (int start = 0; start < image.width; start += 64) {
-        const int n = std::min(64, image.width - start);
-        std::uint64_t ends = 0;
-        for (int k = 0; k < n; ++k) {
-            const float here = d[start + k];
-            const bool apart = !(std::abs(here - before) <= maxDifference);
-            const bool any = std::min(here, before) < kNoDisparity;
-            ends |= std::uint64_t{apart && any} << static_cast<unsigned>(k);
-            before = here;
-        }
-        for (; ends != 0; ends &= ends - 1) {
-            const int c = start + std::countr_zero(ends);
-            close(c);
-            first = d[c] < kNoDisparity ? c : -1;
+    std::size_t count = kernel::findEnds(d, width, maxDifference, strip.ends.data());
+    strip.ends[count] = image.width;
+    for (std::size_t i = 0; i < count; ++i) {
+        const int first = strip.ends[i];
+        if (d[first] < kNoDisparity) {
+            const int last = strip.ends[i + 1];
+            strip.runs.push_back({.row = row,
+                                  .first = first,
+                                  .last = last,
+                                  .group = static_cast<std::uint32_t>(strip.runs.size()),
+                                  .size = static_cast<std::uint32_t>(last - first)});
         }
     }
-    close(image.width);
 }
 
 void IsolatedFilter::joinRows(const DisparityImage& image, std::size_t above, std::size_t here,
@@ -88,20 +71,21 @@ void IsolatedFilter::joinRows(const DisparityImage& image, std::size_t above, st
 }
 
 void IsolatedFilter::label(const DisparityImage& image, int first, int last, float maxDifference,
-                           Runs& runs) {
-    runs.clear();
+                           Strip& strip) {
+    strip.runs.clear();
     std::size_t above = 0;
     for (int row = first; row < last; ++row) {
-        const std::size_t here = runs.size();
-        findRuns(image, row, maxDifference, runs);
-        joinRows(image, above, here, runs.size(), maxDifference, runs);
+        const std::size_t here = strip.runs.size();
+        findRuns(image, row, maxDifference, strip);
+        joinRows(image, above, here, strip.runs.size(), maxDifference, strip.runs);
         above = here;
     }
 }
 
 void IsolatedFilter::joinStrips(const DisparityImage& image, float maxDifference) {
     runs_.clear();
-    for (const Runs& strip : strips_) {
+    for (const Strip& part : strips_) {
+        const Runs& strip = part.runs;
         const std::size_t here = runs_.size();
         for (Run run : strip) {
             run.group += static_cast<std::uint32_t>(here);
@@ -133,9 +117,9 @@ void IsolatedFilter::apply(DisparityImage& image, int minSize, float maxDifferen
               strips_[static_cast<std::size_t>(i)]);
     });
     joinStrips(image, maxDifference);
-    for (std::uint32_t i = 0; i < runs_.size(); ++i) {
-        const Run& run = runs_[i];
-        if (runs_[root(runs_, i)].size < static_cast<std::uint32_t>(minSize)) {
+    for (Run& run : runs_) {
+        run.group = runs_[run.group].group;  // an earlier run or itself: the root is there already
+        if (runs_[run.group].size < static_cast<std::uint32_t>(minSize)) {
             float* d = image.disparity.data() + image.index(0, run.row);
             std::fill(d + run.first, d + run.last, kNoDisparity);
         }

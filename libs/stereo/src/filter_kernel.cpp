@@ -33,6 +33,23 @@ HWY_INLINE void along(std::size_t first, std::size_t last, const Body& body) {
     }
 }
 
+std::size_t findEnds(const float* d, std::size_t width, float maxDifference, std::int32_t* ends) {
+    std::size_t count = 0;
+    if (width > 0 && d[0] < kNone) {
+        ends[count++] = 0;
+    }
+    along(1, width, [&](auto tag, std::size_t i) {
+        const hn::RebindToSigned<decltype(tag)> columns;
+        const auto here = hn::LoadU(tag, d + i);
+        const auto before = hn::LoadU(tag, d + i - 1);
+        // Not a number, from two infinities, compares false.
+        const auto apart = hn::Gt(hn::Abs(hn::Sub(here, before)), hn::Set(tag, maxDifference));
+        count += hn::CompressStore(hn::Iota(columns, static_cast<std::int32_t>(i)),
+                                   hn::RebindMask(columns, apart), columns, ends + count);
+    });
+    return count;
+}
+
 void leastAlong(const float* d, std::size_t width, std::size_t reach, float* out) {
     const std::size_t inner = std::min(reach, width);
     const std::size_t end = width > reach ? std::max(inner, width - reach) : inner;
@@ -108,9 +125,14 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace riftmap::kernel {
 
+HWY_EXPORT(findEnds);
 HWY_EXPORT(leastAlong);
 HWY_EXPORT(discardAbove);
 HWY_EXPORT(growSigma);
+
+std::size_t findEnds(const float* d, std::size_t width, float maxDifference, std::int32_t* ends) {
+    return HWY_DYNAMIC_DISPATCH(findEnds)(d, width, maxDifference, ends);
+}
 
 void leastAlong(const float* d, std::size_t width, std::size_t reach, float* out) {
     HWY_DYNAMIC_DISPATCH(leastAlong)(d, width, reach, out);

@@ -4,8 +4,15 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 
 namespace riftmap::kernel {
+
+/// Writes to `ends` the columns where something begins or ends, rising: i where d[i] differs from
+/// d[i - 1] by more than `maxDifference` and not both are infinite; d[-1] counts as infinite.
+/// `ends` has room for width + kEndsRoom. Returns how many.
+std::size_t findEnds(const float* d, std::size_t width, float maxDifference, std::int32_t* ends);
+inline constexpr std::size_t kEndsRoom = 16;
 
 /// out[i] = least of d within `reach` columns of i; both have `width` numbers.
 void leastAlong(const float* d, std::size_t width, std::size_t reach, float* out);

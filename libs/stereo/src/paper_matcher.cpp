@@ -7,6 +7,7 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
@@ -68,10 +69,10 @@ class Level {
                int firstColumn, DisparityImage& out);
 
  private:
-    static constexpr int kStripsPerThread = 4;
+    static constexpr int kStripsPerThread = 3;
 
     std::vector<std::uint8_t> left_, right_, reversed_;
-    std::vector<AlignedBuffer<std::uint16_t>> scratch_;  ///< one a strip
+    std::vector<AlignedBuffer<std::uint16_t>> scratch_;  ///< one a thread
 };
 
 kernel::MatchJob jobOf(const StereoOptions& options, int width, int height) {
@@ -133,15 +134,23 @@ void Level::match(const StereoOptions& options, const cv::Mat& left, const cv::M
     job.sigma = out.sigma.data();
 
     // Strips only share out the work: each row comes out the same whatever strip it is in. A strip
-    // costs as much as two rows to begin; several a thread keep all of them busy to the end.
+    // costs as much as two rows to begin. Threads take them from the largest to the smallest, so
+    // that few are enough to keep all of them busy to the end, and each keeps its own scratch.
     const int threads = tbb::this_task_arena::max_concurrency();
     const int strips = std::clamp(threads > 1 ? kStripsPerThread * threads : 1, 1, height);
-    scratch_.resize(std::max(scratch_.size(), static_cast<std::size_t>(strips)));
+    scratch_.resize(std::max(scratch_.size(), static_cast<std::size_t>(threads)));
     const std::size_t scratchSize = std::max(kernel::scratchSize(job), 2 * (w + 16));
+    const auto startOf = [&](int strip) {
+        const std::int64_t rest = strips - strip;
+        return height - static_cast<int>(height * rest * rest / (std::int64_t{strips} * strips));
+    };
     const auto inStrips = [&](auto&& work) {
-        tbb::parallel_for(0, strips, [&](int i) {
-            work(i * height / strips, (i + 1) * height / strips,
-                 scratch_[static_cast<std::size_t>(i)].get(scratchSize));
+        std::atomic<int> next{0};
+        tbb::parallel_for(0, threads, [&](int thread) {
+            auto* scratch = scratch_[static_cast<std::size_t>(thread)].get(scratchSize);
+            for (int i = next++; i < strips; i = next++) {
+                work(startOf(i), startOf(i + 1), scratch);
+            }
         });
     };
     inStrips([&](int first, int last, std::uint16_t* scratch) {

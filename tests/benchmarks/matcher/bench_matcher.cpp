@@ -36,6 +36,17 @@ struct Contender {
     std::function<std::unique_ptr<StereoMatcher>(int numDisparities)> make;
 };
 
+/// What goes with the semi-global pass: it smooths, so a smaller window does.
+void setSemiGlobal(StereoOptions& o) {
+    o.semiGlobal = true;
+    o.prefilter = Prefilter::kGradient;
+    o.prefilterGain = 1;
+    o.prefilterCap = 31;
+    o.truncation = 62;
+    o.window = 7;
+    o.sigmaFloor = 0.13;
+}
+
 /// The settings of the table: those of the library, but for what is said here. OpenCV's matchers
 /// get a uniqueness of 10 % (the middle of the 5 .. 15 that its documentation advises; the
 /// `_5` and `_15` variants show both ends) and the same filter of isolated groups. `settings`
@@ -71,19 +82,10 @@ std::vector<Contender> contenders(const std::vector<std::string>& settings) {
             return std::make_unique<OpenCvSgbmMatcher>(openCv(n, uniqueness), full);
         };
     };
-    const auto semiGlobal = [](StereoOptions& o) {
-        o.semiGlobal = true;
-        o.prefilter = Prefilter::kGradient;
-        o.prefilterGain = 1;
-        o.prefilterCap = 31;
-        o.truncation = 62;
-        o.window = 7;
-        o.sigmaFloor = 0.13;
-    };
     return {{"paper", paper([](StereoOptions&) {})},
-            {"paper_semi_global", paper(semiGlobal)},
-            {"paper_dense", paper([semiGlobal](StereoOptions& o) {
-                 semiGlobal(o);
+            {"paper_semi_global", paper(setSemiGlobal)},
+            {"paper_dense", paper([](StereoOptions& o) {
+                 setSemiGlobal(o);
                  o.penaltySmall = 4;
                  o.penaltyLarge = 30;
                  o.anchorReach = 1000;
@@ -173,7 +175,7 @@ void timeAll(const std::string& folder, int rounds, Figures& figures) {
     StereoOptions options;  // window 11, 64 disparities, all stages on
     PaperMatcher paper(options);
     StereoOptions semiGlobalOptions;
-    semiGlobalOptions.semiGlobal = true;
+    setSemiGlobal(semiGlobalOptions);
     PaperMatcher semiGlobal(semiGlobalOptions);
     const auto bm = cv::StereoBM::create(options.numDisparities, options.window);
     bm->setDisp12MaxDiff(1);

@@ -30,18 +30,22 @@ class IsolatedFilter {
         std::uint32_t size;   ///< of the group [px], where the run is its root
     };
     using Runs = std::vector<Run>;
+    struct Strip {
+        Runs runs;
+        std::vector<std::int32_t> ends;  ///< of the runs of a row
+    };
 
     static std::uint32_t root(Runs& runs, std::uint32_t run);
     static void unite(Runs& runs, std::uint32_t a, std::uint32_t b);
-    static void findRuns(const DisparityImage& image, int row, float maxDifference, Runs& runs);
+    static void findRuns(const DisparityImage& image, int row, float maxDifference, Strip& strip);
     /// Unites the runs [above, here) of a row with the runs [here, end) of the next one.
     static void joinRows(const DisparityImage& image, std::size_t above, std::size_t here,
                          std::size_t end, float maxDifference, Runs& runs);
     static void label(const DisparityImage& image, int first, int last, float maxDifference,
-                      Runs& runs);
+                      Strip& strip);
     void joinStrips(const DisparityImage& image, float maxDifference);
 
-    std::vector<Runs> strips_;
+    std::vector<Strip> strips_;
     Runs runs_;  ///< of the whole image
 };
 
