@@ -83,9 +83,9 @@ void IsolatedFilter::label(const DisparityImage& image, int first, int last, flo
 }
 
 void IsolatedFilter::joinStrips(const DisparityImage& image, float maxDifference) {
-    runs_.clear();
-    for (const Strip& part : strips_) {
-        const Runs& strip = part.runs;
+    runs_.swap(strips_.front().runs);  // the others follow it
+    for (std::size_t i = 1; i < strips_.size(); ++i) {
+        const Runs& strip = strips_[i].runs;
         const std::size_t here = runs_.size();
         for (Run run : strip) {
             run.group += static_cast<std::uint32_t>(here);
