@@ -82,20 +82,20 @@ StartPose startOf(const World& world, const PlatformOptions& options) {
     return world.starts[static_cast<std::size_t>(options.startIndex)];
 }
 
-/// True if all around there is nothing but the back of surfaces: inside something solid.
-bool insideSolid(const RayCaster& caster, const Point& p) {
-    for (int x = -1; x <= 1; ++x) {
-        for (int y = -1; y <= 1; ++y) {
-            for (int z = -1; z <= 1; ++z) {
-                const Point d(x + 0.01, y + 0.02, z + 0.03);  // along no edge
-                const auto hit = caster.cast(p, d);
-                if (!hit || hit->normal.dot(d) < 0) {
-                    return false;
-                }
-            }
+/// True if most directions meet the back of a surface: inside something solid. (Not all: what
+/// stands on a floor shares its underside with it.) With `indoor` only where more surface follows
+/// behind: else it is the building's own hull, in a file whose fronts look out of the building.
+bool insideSolid(const RayCaster& caster, const Point& p, bool indoor) {
+    constexpr int kMost = 16;  // of 27
+    int backs = 0;
+    for (int i = 0; i < 27; ++i) {
+        const Point d(i % 3 - 0.99, i / 3 % 3 - 0.98, i / 9 - 0.97);  // along no edge
+        const auto hit = caster.cast(p, d);
+        if (hit && hit->normal.dot(d) > 0) {
+            backs += !indoor || caster.cast(p + (hit->t + 1e-3) * d, d) ? 1 : 0;
         }
     }
-    return true;
+    return backs >= kMost;
 }
 
 }  // namespace
@@ -243,7 +243,9 @@ void SimulatedPlatform::Parts::placeAtStart() {
         throw ConfigError("Platform.start " + text(p) + " lies outside the workspace " +
                           text(workspace.min) + " .. " + text(workspace.max));
     }
-    if (insideSolid(caster, p)) {
+    const bool indoor =
+        !options.world.mesh.empty() && options.world.viewSpace == WorldOptions::ViewSpace::kInside;
+    if (insideSolid(caster, p, indoor)) {
         throw ConfigError("Platform.start " + text(p) + " lies inside the surface of " +
                           world.name);
     }

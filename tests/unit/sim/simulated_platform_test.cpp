@@ -7,6 +7,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 #include <fstream>
+#include <functional>
 #include <opencv2/core.hpp>
 
 namespace riftmap {
@@ -200,7 +201,8 @@ TEST(SimulatedPlatform, NamesWhatIsWrongOnOneLine) {
         cases.emplace_back(configError(options), expected);
     };
     add("none.ply: no such file", [](auto& o) { o.world.mesh = "none.ply"; });
-    add("clearance asks for 0.2 m", [](auto& o) { o.platform.start = {2.91, 4, 1, 0, 0}; });
+    add("clearance asks for 0.2 m", [](auto& o) { o.platform.start = {2.75, 4, 1, 0, 0}; });
+    add("inside the surface", [](auto& o) { o.platform.start = {2.91, 4, 1, 0, 0}; });
     add("outside the workspace", [](auto& o) { o.platform.start = {9, 4, 1, 0, 0}; });
     add("five numbers", [](auto& o) { o.platform.start = {1, 2, 3}; });
     add("3 start poses", [](auto& o) { o.platform.startIndex = 7; });
@@ -212,6 +214,49 @@ TEST(SimulatedPlatform, NamesWhatIsWrongOnOneLine) {
     add("three numbers", [](auto& o) { o.platform.boxMin = {7, 0}; });
     for (const auto& [message, expected] : cases) {
         EXPECT_THAT(message, AllOf(HasSubstr(expected), Not(HasSubstr("\n"))));
+    }
+}
+
+/// A closed room of 5 x 4 x 2.6 m as an OFF file, with a box of 0.8 m standing on its floor.
+/// `turned(i)`: triangle i is turned round; unturned, fronts look out of the hull and the box.
+std::string roomFile(const std::function<bool(int)>& turned) {
+    const std::string file = testing::TempDir() + "riftmap_room.off";
+    std::ofstream out(file);
+    out << "OFF\n16 24 0\n";
+    const double boxes[2][6] = {{0, 0, 0, 5, 4, 2.6}, {3, 1, 0, 3.8, 1.8, 0.8}};
+    for (const auto& b : boxes) {
+        for (int i = 0; i < 8; ++i) {
+            out << b[(i & 1) != 0 ? 3 : 0] << ' ' << b[(i & 2) != 0 ? 4 : 1] << ' '
+                << b[(i & 4) != 0 ? 5 : 2] << '\n';
+        }
+    }
+    const int faces[12][3] = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
+                              {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+    for (int i = 0; i < 24; ++i) {
+        const auto& f = faces[i % 12];
+        const int first = i / 12 * 8;
+        out << "3 " << first + f[0] << ' ' << first + f[turned(i) ? 2 : 1] << ' '
+            << first + f[turned(i) ? 1 : 2] << '\n';
+    }
+    return file;
+}
+
+TEST(SimulatedPlatform, ABuildingMayBeWoundAsItLikesButABoxInItIsSolid) {
+    SimulationOptions options = smallRoom();
+    options.world.viewSpace = WorldOptions::ViewSpace::kInside;
+    for (const auto& [name, turned] : std::vector<std::pair<const char*, std::function<bool(int)>>>{
+             {"fronts into the room", [](int i) { return i < 12; }},
+             {"fronts out of the building", [](int) { return false; }},
+             {"box and hull inside out", [](int) { return true; }},
+             {"every other triangle", [](int i) { return i % 2 == 0; }}}) {
+        SCOPED_TRACE(name);
+        options.world.mesh = roomFile(turned);
+        options.platform.start = {1.5, 1.5, 1.3, 30, 0};
+        EXPECT_EQ(configError(options), "no error");
+        options.platform.start = {3.4, 1.4, 0.4, 0, 0};
+        if (!turned(12) && !turned(13)) {
+            EXPECT_THAT(configError(options), HasSubstr("inside the surface"));
+        }
     }
 }
 
