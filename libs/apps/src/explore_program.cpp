@@ -13,6 +13,7 @@ void ExploreOptions::describe(OptionTable& table) {
                      {"paper", Planner::kPaper},
                      {"random", Planner::kRandom},
                      {"orbit", Planner::kOrbit},
+                     {"lawnmower", Planner::kLawnmower},
                      {"sphere", Planner::kSphere},
                      {"octomap_frontier", Planner::kOctomapFrontier}},
                     "Who chooses the views");

@@ -148,6 +148,8 @@ std::unique_ptr<ViewPlanner> ExploreRun::makePlanner() {
             return baseline("random");
         case Kind::kOrbit:
             return baseline("orbit");
+        case Kind::kLawnmower:
+            return baseline("lawnmower");
         case Kind::kSphere:
             return baseline("sphere");
         case Kind::kOctomapFrontier:

@@ -16,10 +16,15 @@ constexpr int kCandidates = 150;
 constexpr std::size_t kMostFrontiers = 600;  ///< looked at from a candidate
 constexpr int kDirections = 24;              ///< tried at a candidate
 
+constexpr double kSteepest = 0.3;  ///< cosine between a line of sight and the way into the unknown
+/// Where surface ends there is more of it behind; the shadows in the air are many and mostly empty.
+constexpr double kAir = 0.1;
 constexpr int kMostTries = 2;  ///< views after which a frontier voxel that stays is given up
 
 struct Frontier {
     Eigen::Vector3d centre;
+    Eigen::Vector3d inward;  ///< unit, towards what is unknown
+    double worth;            ///< 1 beside surface, less in the air
     std::size_t voxel;
 };
 
@@ -28,8 +33,10 @@ enum Voxel : std::uint8_t { kUnknown, kFree, kOccupied };
 /// The OctoMap as a plain array over the region of interest: quick to look into.
 class VoxelGrid {
  public:
-    VoxelGrid(const octomap::OcTree& tree, const Eigen::AlignedBox3d& region)
-        : resolution_(tree.getResolution()),
+    /// `outside`: what lies around the region.
+    VoxelGrid(const octomap::OcTree& tree, const Eigen::AlignedBox3d& region, Voxel outside)
+        : outside_(outside),
+          resolution_(tree.getResolution()),
           min_((region.min() / resolution_).array().floor() * resolution_),
           size_((region.sizes() / resolution_).array().ceil().cast<int>() + 1) {
         voxels_.reserve(static_cast<std::size_t>(size_.prod()));
@@ -55,19 +62,24 @@ class VoxelGrid {
     Voxel at(const Eigen::Vector3i& v) const {
         return inside(v) ? static_cast<Voxel>(voxels_[static_cast<std::size_t>(
                                (v.z() * size_.y() + v.y()) * size_.x() + v.x())])
-                         : kUnknown;
+                         : outside_;
     }
     Voxel at(const Eigen::Vector3d& p) const { return at(voxelOf(p)); }
 
-    /// Free voxels with an unknown neighbour inside the region.
+    /// Unknown voxels with a free neighbour.
     std::vector<Frontier> frontiers() const {
         std::vector<Frontier> out;
         for (int z = 0; z < size_.z(); ++z) {
             for (int y = 0; y < size_.y(); ++y) {
                 for (int x = 0; x < size_.x(); ++x) {
                     const Eigen::Vector3i v(x, y, z);
-                    if (at(v) == kFree && besideUnknown(v)) {
-                        out.push_back({centre(v), flat(v)});
+                    if (at(v) != kUnknown) {
+                        continue;
+                    }
+                    const Eigen::Vector3d inward = awayFromFree(v);
+                    if (inward.squaredNorm() > 0) {
+                        out.push_back({centre(v), inward.normalized(),
+                                       besideSurface(v) ? 1.0 : kAir, flat(v)});
                     }
                 }
             }
@@ -75,12 +87,18 @@ class VoxelGrid {
         return out;
     }
 
-    /// True if no occupied voxel lies between (half-voxel steps).
-    bool sees(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const {
-        const Eigen::Vector3d way = to - from;
-        const int steps = static_cast<int>(std::ceil(way.norm() / (0.5 * resolution_)));
+    /// True if one looks from there into the unknown that begins with the frontier, through space
+    /// that is free (half-voxel steps; beside the frontier the unknown may be grazed).
+    bool sees(const Eigen::Vector3d& from, const Frontier& to) const {
+        const Eigen::Vector3d way = to.centre - from;
+        const double range = way.norm();
+        if (way.dot(to.inward) < kSteepest * range) {
+            return false;
+        }
+        const int steps = static_cast<int>(std::ceil(range / (0.5 * resolution_)));
         for (int i = 1; i < steps; ++i) {
-            if (at(voxelOf(from + way * (static_cast<double>(i) / steps))) == kOccupied) {
+            const Voxel here = at(voxelOf(from + way * (static_cast<double>(i) / steps)));
+            if (here == kOccupied || (here == kUnknown && i + 3 < steps)) {
                 return false;
             }
         }
@@ -94,19 +112,29 @@ class VoxelGrid {
     Eigen::Vector3i voxelOf(const Eigen::Vector3d& p) const {
         return ((p - min_) / resolution_).array().floor().cast<int>();
     }
-    bool besideUnknown(const Eigen::Vector3i& v) const {
+    /// Sum of the directions away from free neighbours.
+    Eigen::Vector3d awayFromFree(const Eigen::Vector3i& v) const {
+        Eigen::Vector3d sum = Eigen::Vector3d::Zero();
         for (int axis = 0; axis < 3; ++axis) {
             for (const int d : {-1, 1}) {
                 Eigen::Vector3i n = v;
                 n[axis] += d;
-                if (inside(n) && at(n) == kUnknown) {
-                    return true;
-                }
+                sum[axis] -= at(n) == kFree ? d : 0;
+            }
+        }
+        return sum;
+    }
+    bool besideSurface(const Eigen::Vector3i& v) const {
+        for (int i = 0; i < 27; ++i) {
+            const Eigen::Vector3i n = v + Eigen::Vector3i(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
+            if (at(n) == kOccupied) {
+                return true;
             }
         }
         return false;
     }
 
+    Voxel outside_;
     double resolution_;
     Eigen::Vector3d min_;
     Eigen::Vector3i size_;
@@ -122,7 +150,8 @@ class OctomapFrontier : public ViewSource {
     std::optional<std::vector<Pose>> next(const BaselineState& state) override {
         insert(state);
         const Eigen::AlignedBox3d region = target_.isEmpty() ? workspace(state.limits) : target_;
-        const VoxelGrid grid(tree_, region);
+        // Round an object that stands alone there is nothing.
+        const VoxelGrid grid(tree_, region, target_.isEmpty() ? kUnknown : kFree);
         std::vector<Frontier> all = grid.frontiers();
         std::erase_if(all, [&](const Frontier& f) {
             const auto tries = tries_.find(f.voxel);
@@ -146,7 +175,7 @@ class OctomapFrontier : public ViewSource {
         if (path) {
             for (const Frontier& f : all) {
                 if (inView(state, path->back(), f.centre) &&
-                    grid.sees(path->back().translation, f.centre)) {
+                    grid.sees(path->back().translation, f)) {
                     ++tries_[f.voxel];
                 }
             }
@@ -157,7 +186,7 @@ class OctomapFrontier : public ViewSource {
  private:
     struct Candidate {
         Pose view;
-        double gain = 0;  ///< frontier voxels in view
+        double gain = 0;  ///< worth of the frontier voxels in view
         double rate = 0;  ///< of them a second, going straight
     };
 
@@ -195,21 +224,22 @@ class OctomapFrontier : public ViewSource {
         if ((target_.isEmpty() && grid.at(place) != kFree) || !state.segmentClear(place, place)) {
             return std::nullopt;
         }
-        std::vector<Eigen::Vector3d> seen;
+        std::vector<const Frontier*> seen;
         for (const Frontier& f : frontiers) {
             const double range = (f.centre - place).norm();
             if (range >= state.limits.nearLimit && range <= state.limits.farLimit &&
-                grid.sees(place, f.centre)) {
-                seen.push_back(f.centre);
+                grid.sees(place, f)) {
+                seen.push_back(&f);
             }
         }
         Candidate out;
         for (int i = 0; i < kDirections && !seen.empty(); ++i) {
-            const Eigen::Vector3d& f = seen[random_() % seen.size()];
+            const Eigen::Vector3d& f = seen[random_() % seen.size()]->centre;
             const Pose view = viewOf(state.limits, place, f - place);
-            const auto gain = static_cast<double>(
-                std::count_if(seen.begin(), seen.end(),
-                              [&](const Eigen::Vector3d& p) { return inView(state, view, p); }));
+            double gain = 0;
+            for (const Frontier* p : seen) {
+                gain += inView(state, view, p->centre) ? p->worth : 0.0;
+            }
             if (gain > out.gain) {
                 out.view = view;
                 out.gain = gain;

@@ -19,7 +19,7 @@ namespace riftmap {
 
 /// Section [Explore].
 struct ExploreOptions {
-    enum class Planner { kRiftmap, kPaper, kRandom, kOrbit, kSphere, kOctomapFrontier };
+    enum class Planner { kRiftmap, kPaper, kRandom, kOrbit, kLawnmower, kSphere, kOctomapFrontier };
 
     Planner planner = Planner::kRiftmap;
     bool knownBox = false;  ///< the planner is told the box of an object that stands alone

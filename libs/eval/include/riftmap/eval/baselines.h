@@ -58,9 +58,9 @@ const std::vector<std::string>& baselineNames();
 ///   looking outwards;
 /// - lawnmower: stops on rows through the workspace, six directions at each;
 /// - sphere: places spread evenly over a sphere round the target, in a short tour;
-/// - octomap_frontier: the view that sees most frontier voxels (free beside unknown) of an OctoMap
-///   of all clouds so far, per second of path at 1 m/s and 1 s a view; a voxel that stays frontier
-///   after two views meant to see it is given up.
+/// - octomap_frontier: the view that looks into most frontier voxels (unknown beside free) of an
+///   OctoMap of all clouds so far, those beside surface counting ten times, per second of path at
+///   1 m/s and 1 s a view; a voxel that stays frontier after two views meant to see it is given up.
 /// Throws std::invalid_argument for another name, and for `sphere` without a target.
 std::unique_ptr<ViewSource> makeBaseline(const std::string& name, const BaselineOptions& options,
                                          const Eigen::AlignedBox3d& target, std::uint64_t seed);
