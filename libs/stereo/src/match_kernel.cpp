@@ -322,8 +322,7 @@ void searchLeft(const Strip& s, int ratio, int margin, const Minima& out, std::s
 
 /// The semi-global pass carries a match on along the row, also over surface that does not tell one
 /// disparity from another: flat or periodic. Marks as ambiguous what lies farther than anchorReach
-/// from every pixel whose window alone has the same minimum, every rival worse by the small
-/// penalty.
+/// from every pixel whose window alone has the same minimum, every rival worse by anchorMargin.
 void requireAnchors(const MatchJob& job, const Minima& own, const Minima& m) {
     const auto width = static_cast<std::size_t>(job.width);
     const auto reach = static_cast<std::size_t>(job.anchorReach);

@@ -57,10 +57,21 @@ const Matcher kMatchers[] = {{"paper", MatcherKind::kPaper},
                              {"opencv_bm", MatcherKind::kOpenCvBlock},
                              {"opencv_sgbm", MatcherKind::kOpenCvSgbm}};
 
-DisparityImage match(const Matcher& matcher, const cv::Mat& left, const cv::Mat& right,
-                     const StereoCamera& camera, int numDisparities) {
+/// OpenCV's matchers get the uniqueness and the left/right check that suit them, as in the
+/// benchmark on real pairs.
+StereoOptions optionsFor(const Matcher& matcher) {
     StereoOptions options;
     options.matcher = matcher.kind;
+    if (matcher.kind != MatcherKind::kPaper) {
+        options.uniqueness = 10;
+        options.leftRightTolerance = 1;
+    }
+    return options;
+}
+
+DisparityImage match(const Matcher& matcher, const cv::Mat& left, const cv::Mat& right,
+                     const StereoCamera& camera, int numDisparities) {
+    StereoOptions options = optionsFor(matcher);
     options.numDisparities = numDisparities;
     StereoObservation observation;
     observation.camera = camera;
@@ -159,8 +170,7 @@ void scoreObjects(const std::vector<std::string>& settings, std::ostream& csv) {
         {"bunny", "/objects/stanford_bunny_35k.obj"},
         {"dragon", "/objects/stanford_dragon_res3.ply"}};
     for (const Matcher& matcher : kMatchers) {
-        StereoOptions options;
-        options.matcher = matcher.kind;
+        StereoOptions options = optionsFor(matcher);
         if (matcher.kind == MatcherKind::kPaper) {
             OptionTable table;
             options.describe(table);
