@@ -43,7 +43,7 @@ Choice::Choice(Knowledge& knowledge, std::vector<Pose>& pool)
       random_(k_.options().seed * 1000003U + k_.views()),
       good_(k_.sensor().goodDepth(k_.resolution())) {}
 
-/// Adds the view if the camera can get there. The place is moved to the middle of its voxel.
+/// Adds the view if the camera can get there, from Knowledge::placeAt().
 bool Choice::add(const Eigen::Vector3d& eye, const Eigen::Vector3d& target) {
     const auto place = k_.placeAt(eye);
     if (!place || (target - place->eye).norm() < 1e-6) {

@@ -157,6 +157,36 @@ TEST(PixelGraph, ClosedOnceSeenClosed) {
     EXPECT_EQ(openIn(0.8F, 1.2F), 0U);
 }
 
+TEST(PixelGraph, TheRimStaysOpenWhenAFinerViewsInnerPixelsMeetItsVertices) {
+    Scene scene = ground();  // a table's top
+    scene.patch({-0.3, -0.3, 0.6}, {0.6, 0, 0}, {0, 0.6, 0});
+    PixelGraph graph;
+    graph.merge(makeView(scene, smallCamera(96, 72), lookDown(0, 0, 1.8)));
+    graph.merge(makeView(scene, smallCamera(384, 288), lookDown(0, 0, 1.8)));
+    std::set<int> torn;  // pieces of 5 cm of the edge x = 0.3 that hold an open vertex
+    graph.forEachVertexIn({0.27F, -0.275F, 0.55F}, {0.33F, 0.275F, 0.65F}, [&](VertexId id) {
+        if ((graph.open(id) & kDepthStep) != 0) {
+            torn.insert(static_cast<int>(std::floor((graph.position(id).y() + 0.275F) / 0.05F)));
+        }
+    });
+    EXPECT_EQ(torn.size(), 11U);
+}
+
+TEST(PixelGraph, ADenserMapIsClosedByTheViewThatGoesOnAroundIt) {
+    PixelGraph graph;
+    graph.merge(makeView(ground(), smallCamera(384, 288), lookDown(0, 0, 0.8)));
+    const auto openAtBorder = [&] {
+        int n = 0;
+        graph.forEachVertexIn({-0.5F, -0.5F, -0.1F}, {0.5F, 0.5F, 0.1F}, [&](VertexId id) {
+            n += (graph.open(id) & kImageBorder) != 0 ? 1 : 0;
+        });
+        return n;
+    };
+    EXPECT_GT(openAtBorder(), 1000);
+    graph.merge(makeView(ground(), smallCamera(96, 72), lookDown(0, 0, 1.6)));
+    EXPECT_EQ(openAtBorder(), 0);
+}
+
 TEST(PixelGraph, TooCoarseUntilSeenFromNearer) {
     PixelGraph graph;                                                         // 2 cm
     const auto far = makeView(ground(), smallCamera(), lookDown(0, 0, 1.7));  // 2.2 cm a pixel

@@ -87,6 +87,33 @@ TEST(FreeSpace, waysKeepTheClearance) {
     EXPECT_GT(length, 2 * std::hypot(1.5, 1.8) - 0.5);
 }
 
+TEST(FreeSpace, besideKnownSurfaceOnlyTheSurfaceIsInTheWay) {
+    FreeSpace space(kBox, 0.1);
+    const View view = test::viewOf(lookAt({0, 0, 0}, {1, 0, 0}), test::wall(2.03));
+    space.carve(view, sensorOf(view), false);
+    const Eigen::Vector3d beside(1.8, 0, 0);
+    EXPECT_TRUE(space.knownAround({1.2, 0, 0}, 0.2));
+    EXPECT_FALSE(
+        space.knownAround(beside, 0.22));  // voxels that are not free, and why is not known
+    std::vector<Eigen::Vector3d> wall;
+    for (double y = -1; y < 1; y += 0.02) {
+        for (double z = -1; z < 1; z += 0.02) {
+            wall.emplace_back(2.03, y, z);
+        }
+    }
+    space.setSurface(wall);
+    EXPECT_TRUE(space.knownAround(beside, 0.22));
+    EXPECT_FALSE(space.knownAround({1.2, 0.75, 0}, 0.3));  // beside the field of view
+    EXPECT_FALSE(space.knownAround({-1.95, 0, 0}, 0.3));   // reaches out of the grid
+    space.updateClear(0.2, kBox);
+    EXPECT_FALSE(space.isClear(beside));
+    const auto clear = space.nearestClear(beside, 2, false);
+    ASSERT_TRUE(clear);
+    EXPECT_TRUE(space.isClear(*clear));
+    EXPECT_LT((*clear - beside).norm(), 0.2);
+    EXPECT_FALSE(space.nearestClear({3.5, 0, 0}, 2, false));
+}
+
 TEST(FreeSpace, theUnknownIsSeenThroughFreeSpaceOnly) {
     FreeSpace space(kBox, 0.1);
     const View view = test::viewOf(lookAt({0, 0, 0}, {1, 0, 0}), test::wall(2.0));
