@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <chrono>
 #include <cmath>
 #include <cstdint>
@@ -13,6 +14,8 @@
 #include <cstdlib>
 #include <functional>
 #include <iostream>
+#include <iterator>
+#include <map>
 #include <memory>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core/utility.hpp>
@@ -128,28 +131,22 @@ double median(std::vector<double> values) {
     return values[values.size() / 2];
 }
 
-/// 512 x 384: the middle of the Motorcycle pair, or texture at several depths where it is absent.
+/// 512 x 384: the middle of the Motorcycle pair. Times depend on what is seen, so nothing else
+/// stands in for it: throws where it is absent.
 std::pair<cv::Mat, cv::Mat> timedPair(const std::string& folder) {
     const cv::Size size(512, 384);
+    const auto pair = loadPair(folder, "motorcycle");
+    if (!pair) {
+        throw std::runtime_error(folder +
+                                 ": no Motorcycle pair to time with; tests/benchmarks/matcher/"
+                                 "fetch_pairs FOLDER takes it out of Debian's packages, then "
+                                 "--data FOLDER");
+    }
+    const cv::Rect middle((pair->left.cols - size.width) / 2, (pair->left.rows - size.height) / 2,
+                          size.width, size.height);
     cv::Mat left, right;
-    if (const auto pair = loadPair(folder, "motorcycle")) {
-        const cv::Rect middle((pair->left.cols - size.width) / 2,
-                              (pair->left.rows - size.height) / 2, size.width, size.height);
-        cv::cvtColor(pair->left(middle), left, cv::COLOR_BGR2GRAY);
-        cv::cvtColor(pair->right(middle), right, cv::COLOR_BGR2GRAY);
-        return {left, right};
-    }
-    cv::Mat texture(size.height, size.width + 64, CV_8UC1);
-    cv::RNG rng(1);
-    rng.fill(texture, cv::RNG::UNIFORM, 0, 256);
-    cv::GaussianBlur(texture, texture, {3, 3}, 0.8);
-    left = texture.colRange(0, size.width).clone();
-    right = left.clone();
-    for (int band = 0; band < 4; ++band) {
-        const auto rows = cv::Range(band * size.height / 4, (band + 1) * size.height / 4);
-        const int d = 8 + 12 * band;
-        texture(rows, cv::Range(d, d + size.width)).copyTo(right.rowRange(rows));
-    }
+    cv::cvtColor(pair->left(middle), left, cv::COLOR_BGR2GRAY);
+    cv::cvtColor(pair->right(middle), right, cv::COLOR_BGR2GRAY);
     return {left, right};
 }
 
@@ -168,9 +165,25 @@ void computeOnly() {
     });
 }
 
-/// Median times by turns, so that a busy moment of the machine meets all of them. A turn is a few
-/// frames one after another, as they come from a camera.
+/// What is timed, and how long each of its turns took.
+struct Turn {
+    std::string name;
+    std::function<void()> work;
+    std::vector<double> ms;  ///< a frame
+};
+
+/// Median over the rounds of the one's time over the other's: a busy moment of the machine meets
+/// both turns of a round and divides out.
+double medianRatio(const Turn& a, const Turn& b) {
+    std::vector<double> ratios(a.ms.size());
+    std::transform(a.ms.begin(), a.ms.end(), b.ms.begin(), ratios.begin(), std::divides<>());
+    return median(ratios);
+}
+
+/// Times by turns in one process. A turn is several frames one after another, as they come from a
+/// camera; what is compared with one another stands side by side.
 void timeAll(const std::string& folder, int rounds, Figures& figures) {
+    constexpr int kFrames = 8;
     const auto [left, right] = timedPair(folder);
     cv::setNumThreads(1);
     StereoOptions options;  // window 11, 64 disparities, all stages on
@@ -185,24 +198,19 @@ void timeAll(const std::string& folder, int rounds, Figures& figures) {
     DisparityImage disparity;
     cv::Mat raw;
     tbb::task_arena one(1), two(2);
-    struct Turn {
-        std::string name;
-        std::function<void()> work;
-        std::vector<double> ms;
-    };
     const auto in = [&](tbb::task_arena& arena, PaperMatcher& matcher) {
         return [&] { arena.execute([&] { matcher.compute(left, right, disparity); }); };
     };
-    std::vector<Turn> turns = {
-        {"paper, 1 thread", in(one, paper), {}},
-        {"cv::StereoBM, 1 thread", [&] { bm->compute(left, right, raw); }, {}},
-        {"paper, 2 threads", in(two, paper), {}},
-        {"paper semi-global, 1 thread", in(one, semiGlobal), {}},
-        {"cv::StereoSGBM 3-way, 1 thread", [&] { sgbm->compute(left, right, raw); }, {}},
-        {"compute only, 1 thread", [&] { one.execute(computeOnly); }, {}},
-        {"compute only, 2 threads", [&] { two.execute(computeOnly); }, {}}};
-    constexpr int kFrames = 3;
-    for (int round = -2; round < rounds; ++round) {  // two rounds to warm up
+    enum { kBm, kPaper, kPaper2, kSemiGlobal, kSgbm, kCompute, kCompute2 };
+    std::array<Turn, 7> turns;
+    turns[kBm] = {"cv::StereoBM, 1 thread", [&] { bm->compute(left, right, raw); }, {}};
+    turns[kPaper] = {"paper, 1 thread", in(one, paper), {}};
+    turns[kPaper2] = {"paper, 2 threads", in(two, paper), {}};
+    turns[kSemiGlobal] = {"paper semi-global, 1 thread", in(one, semiGlobal), {}};
+    turns[kSgbm] = {"cv::StereoSGBM 3-way, 1 thread", [&] { sgbm->compute(left, right, raw); }, {}};
+    turns[kCompute] = {"compute only, 1 thread", [&] { one.execute(computeOnly); }, {}};
+    turns[kCompute2] = {"compute only, 2 threads", [&] { two.execute(computeOnly); }, {}};
+    for (int round = -1; round < rounds; ++round) {  // one round to warm up
         for (auto& turn : turns) {
             const auto start = std::chrono::steady_clock::now();
             for (int frame = 0; frame < kFrames; ++frame) {
@@ -215,25 +223,27 @@ void timeAll(const std::string& folder, int rounds, Figures& figures) {
             }
         }
     }
-    std::printf("%d x %d, 64 disparities, window 11, median of %d rounds by turns\n", left.cols,
-                left.rows, rounds);
+    std::printf("%d x %d, 64 disparities, window 11, medians of %d rounds of %d frames a turn\n",
+                left.cols, left.rows, rounds, kFrames);
     for (const auto& turn : turns) {
-        std::printf("  %-32s %7.2f ms\n", turn.name.c_str(), median(turn.ms));
+        std::printf("  %-36s %7.2f ms\n", turn.name.c_str(), median(turn.ms));
     }
-    const auto ms = [&](std::size_t i) { return median(turns[i].ms); };
-    const auto ratio = [&](const char* figure, double value) {
-        std::printf("  %-32s %7.3f\n", figure, value);
+    const auto ratio = [&](const char* figure, int a, int b) {
+        const double value = medianRatio(turns.at(static_cast<std::size_t>(a)),
+                                         turns.at(static_cast<std::size_t>(b)));
+        std::printf("  %-36s %7.3f\n", figure, value);
         figures.add(figure, value, "");
     };
-    ratio("time_ratio_bm_1thread", ms(0) / ms(1));
-    ratio("time_ratio_sgbm_1thread", ms(0) / ms(4));
-    ratio("speedup_2threads", ms(0) / ms(2));
-    ratio("machine_speedup_2threads", ms(5) / ms(6));
-    ratio("semi_global_time_ratio_bm_1thread", ms(3) / ms(1));
-    ratio("semi_global_time_ratio_sgbm_1thread", ms(3) / ms(4));
-    figures.add("paper_1thread", ms(0), "ms");
-    figures.add("opencv_bm_1thread", ms(1), "ms");
-    figures.add("opencv_sgbm_1thread", ms(4), "ms");
+    ratio("time_ratio_bm_1thread", kPaper, kBm);
+    ratio("time_ratio_sgbm_1thread", kPaper, kSgbm);
+    ratio("speedup_2threads", kPaper, kPaper2);
+    ratio("machine_speedup_2threads", kCompute, kCompute2);
+    ratio("semi_global_time_ratio_bm_1thread", kSemiGlobal, kBm);
+    ratio("semi_global_time_ratio_sgbm_1thread", kSemiGlobal, kSgbm);
+    figures.add("paper_1thread", median(turns[kPaper].ms), "ms");
+    figures.add("paper_2threads", median(turns[kPaper2].ms), "ms");
+    figures.add("opencv_bm_1thread", median(turns[kBm].ms), "ms");
+    figures.add("opencv_sgbm_1thread", median(turns[kSgbm].ms), "ms");
 }
 
 void writeScore(const std::string& prefix, const Score& s, Figures& figures) {
@@ -292,12 +302,14 @@ double invented(const Pair& pair, const Contender& contender, int numDisparities
 void scoreAll(const std::string& folder, const std::string& pictures, const std::string& only,
               const std::vector<std::string>& settings, Figures& figures) {
     cv::setNumThreads(-1);
+    bool any = false;
     for (const char* name : {"motorcycle", "aloe", "cones", "tsukuba"}) {
         const auto pair = loadPair(folder, name);
         if (!pair) {
             std::printf("%s: SKIPPED, not in %s\n", name, folder.c_str());
             continue;
         }
+        any = true;
         std::printf("\n%-10s %-18s %7s %6s %6s %6s | %7s %6s %6s | %8s %8s %8s\n", name,
                     "(percent)", "matched", "bad1", "bad2", "mean", "matched", "bad1", "bad2",
                     "occluded", "residual", "too near");
@@ -321,6 +333,9 @@ void scoreAll(const std::string& folder, const std::string& pictures, const std:
             }
         }
     }
+    if (!any) {
+        throw std::runtime_error(folder + ": none of the pairs is there");
+    }
 }
 
 std::string defaultData() {
@@ -329,42 +344,85 @@ std::string defaultData() {
            "/middlebury";
 }
 
-int run(int argc, char** argv) {
-    std::string csv, pictures, only, folder = defaultData();
-    int rounds = 41;
+struct Arguments {
+    std::string csv, pictures, only;
     std::string part = "all";
+    std::string data = defaultData();
+    int rounds = 21;
     std::vector<std::string> settings;
-    for (int i = 1; i < argc; i += 2) {
-        const std::string flag = argv[i];
-        if (i + 1 == argc ||
-            (flag != "--csv" && flag != "--data" && flag != "--pictures" && flag != "--rounds" &&
-             flag != "--part" && flag != "--only" && flag != "--set")) {
-            std::cerr
-                << "bench-matcher [--csv FILE] [--data MIDDLEBURY_FOLDER] [--pictures FOLDER] "
-                   "[--rounds N] [--part all|times|scores] [--only MATCHER] "
-                   "[--set Stereo.key=value]... (for the scores of ours)\n";
-            return 2;
+};
+
+constexpr const char* kUsage =
+    "bench-matcher [--csv FILE] [--data MIDDLEBURY_FOLDER] [--pictures FOLDER] [--rounds N] "
+    "[--part all|times|scores] [--only MATCHER] [--set Stereo.key=value]... (for the scores of "
+    "ours)";
+
+int parseRounds(const std::string& text) {
+    int n = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), n);
+    if (error != std::errc() || end != text.data() + text.size() || n < 1 || n > 10000) {
+        throw ConfigError("--rounds " + text + ": allowed: 1 .. 10000");
+    }
+    return n;
+}
+
+/// Throws ConfigError where `value` is none of `allowed`.
+void checkOneOf(const std::string& flag, const std::string& value,
+                const std::vector<std::string>& allowed) {
+    if (std::find(allowed.begin(), allowed.end(), value) == allowed.end()) {
+        std::string message = flag + " " + value + ": allowed:";
+        for (const auto& name : allowed) {
+            message += " " + name;
         }
-        if (flag == "--rounds") {
-            rounds = std::max(1, std::atoi(argv[i + 1]));
-        } else if (flag == "--set") {
-            settings.emplace_back(argv[i + 1]);
+        throw ConfigError(message);
+    }
+}
+
+/// Throws ConfigError for what it does not know.
+Arguments parse(const std::vector<std::string>& words) {
+    Arguments a;
+    const std::map<std::string, std::string*> texts = {{"--csv", &a.csv},
+                                                       {"--data", &a.data},
+                                                       {"--pictures", &a.pictures},
+                                                       {"--part", &a.part},
+                                                       {"--only", &a.only}};
+    for (std::size_t i = 0; i < words.size(); i += 2) {
+        const auto text = texts.find(words[i]);
+        const bool other = words[i] == "--rounds" || words[i] == "--set";
+        if (text == texts.end() && !other) {
+            throw ConfigError(words[i] + ": no such option; " + kUsage);
+        }
+        if (i + 1 == words.size()) {
+            throw ConfigError(words[i] + ": needs a value; " + kUsage);
+        }
+        if (text != texts.end()) {
+            *text->second = words[i + 1];
+        } else if (words[i] == "--rounds") {
+            a.rounds = parseRounds(words[i + 1]);
         } else {
-            (flag == "--csv"    ? csv
-             : flag == "--data" ? folder
-             : flag == "--part" ? part
-             : flag == "--only" ? only
-                                : pictures) = argv[i + 1];
+            a.settings.push_back(words[i + 1]);
         }
     }
-    Figures figures(csv);
-    if (part != "scores") {
-        timeAll(folder, rounds, figures);
+    checkOneOf("--part", a.part, {"all", "times", "scores"});
+    const auto all = contenders(a.settings);
+    all.front().make(64);  // the settings are right
+    if (!a.only.empty()) {
+        std::vector<std::string> names;
+        std::transform(all.begin(), all.end(), std::back_inserter(names),
+                       [](const Contender& c) { return c.name; });
+        checkOneOf("--only", a.only, names);
     }
-    if (part != "times") {
-        scoreAll(folder, pictures, only, settings, figures);
+    return a;
+}
+
+void run(const Arguments& a) {
+    Figures figures(a.csv);
+    if (a.part != "scores") {
+        timeAll(a.data, a.rounds, figures);
     }
-    return 0;
+    if (a.part != "times") {
+        scoreAll(a.data, a.pictures, a.only, a.settings, figures);
+    }
 }
 
 }  // namespace
@@ -372,7 +430,11 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
     try {
-        return riftmap::bench::run(argc, argv);
+        riftmap::bench::run(riftmap::bench::parse({argv + 1, argv + argc}));
+        return 0;
+    } catch (const riftmap::ConfigError& e) {
+        std::cerr << "bench-matcher: " << e.what() << "\n";
+        return 2;
     } catch (const std::exception& e) {
         std::cerr << "bench-matcher: " << e.what() << "\n";
         return 1;
