@@ -12,28 +12,36 @@
 
 namespace riftmap {
 
-std::uint32_t IsolatedFilter::root(Runs& runs, std::uint32_t run) {
-    while (runs[run].group != run) {
-        runs[run].group = runs[runs[run].group].group;  // halves the way for the next one
-        run = runs[run].group;
+/// Reads only: strips look for the roots of their runs at the same time.
+std::uint32_t IsolatedFilter::root(std::size_t run) const {
+    std::uint32_t at = runs_[run].group;
+    while (runs_[at].group != at) {
+        at = runs_[at].group;
+    }
+    return at;
+}
+
+std::uint32_t IsolatedFilter::halveWay(std::uint32_t run) {
+    while (runs_[run].group != run) {
+        runs_[run].group = runs_[runs_[run].group].group;  // halves the way for the next one
+        run = runs_[run].group;
     }
     return run;
 }
 
-void IsolatedFilter::unite(Runs& runs, std::uint32_t a, std::uint32_t b) {
-    a = root(runs, a);
-    b = root(runs, b);
+void IsolatedFilter::unite(std::uint32_t a, std::uint32_t b) {
+    a = halveWay(a);
+    b = halveWay(b);
     if (a != b) {
         const auto [low, high] = std::minmax(a, b);
-        runs[high].group = low;
-        runs[low].size += runs[high].size;
+        runs_[high].group = low;
+        runs_[low].size += runs_[high].size;
     }
 }
 
 void IsolatedFilter::findRuns(const DisparityImage& image, int row, float maxDifference,
                               Strip& strip) {
     const auto width = static_cast<std::size_t>(image.width);
-    strip.ends.resize(width + kernel::kEndsRoom + 1);
     const float* d = image.disparity.data() + image.index(0, row);
     std::size_t count = kernel::findEnds(d, width, maxDifference, strip.ends.data());
     strip.ends[count] = image.width;
@@ -41,24 +49,25 @@ void IsolatedFilter::findRuns(const DisparityImage& image, int row, float maxDif
         const int first = strip.ends[i];
         if (d[first] < kNoDisparity) {
             const int last = strip.ends[i + 1];
-            strip.runs.push_back({.row = row,
-                                  .first = first,
-                                  .last = last,
-                                  .group = static_cast<std::uint32_t>(strip.runs.size()),
-                                  .size = static_cast<std::uint32_t>(last - first)});
+            runs_[strip.end] = {.row = row,
+                                .first = first,
+                                .last = last,
+                                .group = static_cast<std::uint32_t>(strip.end),
+                                .size = static_cast<std::uint32_t>(last - first)};
+            ++strip.end;
         }
     }
 }
 
-void IsolatedFilter::joinRows(const DisparityImage& image, std::size_t above, std::size_t here,
-                              std::size_t end, float maxDifference, Runs& runs) {
-    for (std::size_t a = above, b = here; a < here && b < end;) {
-        const Run& upper = runs[a];
-        const Run& lower = runs[b];
+void IsolatedFilter::joinRows(const DisparityImage& image, std::size_t above, std::size_t aboveEnd,
+                              std::size_t here, std::size_t end, float maxDifference) {
+    for (std::size_t a = above, b = here; a < aboveEnd && b < end;) {
+        const Run& upper = runs_[a];
+        const Run& lower = runs_[b];
         const int last = std::min(upper.last, lower.last);
         for (int c = std::max(upper.first, lower.first); c < last; ++c) {
             if (std::abs(image.at(c, upper.row) - image.at(c, lower.row)) <= maxDifference) {
-                unite(runs, static_cast<std::uint32_t>(a), static_cast<std::uint32_t>(b));
+                unite(static_cast<std::uint32_t>(a), static_cast<std::uint32_t>(b));
                 break;
             }
         }
@@ -72,37 +81,29 @@ void IsolatedFilter::joinRows(const DisparityImage& image, std::size_t above, st
 
 void IsolatedFilter::label(const DisparityImage& image, int first, int last, float maxDifference,
                            Strip& strip) {
-    strip.runs.clear();
-    std::size_t above = 0;
+    strip.ends.resize(static_cast<std::size_t>(image.width) + kernel::kEndsRoom + 1);
+    strip.begin = strip.end = strip.lastRow = image.index(0, first);
     for (int row = first; row < last; ++row) {
-        const std::size_t here = strip.runs.size();
+        const std::size_t above = strip.lastRow;
+        strip.lastRow = strip.end;
         findRuns(image, row, maxDifference, strip);
-        joinRows(image, above, here, strip.runs.size(), maxDifference, strip.runs);
-        above = here;
+        joinRows(image, above, strip.lastRow, strip.lastRow, strip.end, maxDifference);
+        if (row == first) {
+            strip.secondRow = strip.end;
+        }
+    }
+    for (std::size_t i = strip.begin; i < strip.end; ++i) {
+        runs_[i].group = runs_[runs_[i].group].group;  // an earlier one or itself: at the root
     }
 }
 
-void IsolatedFilter::joinStrips(const DisparityImage& image, float maxDifference) {
-    runs_.swap(strips_.front().runs);  // the others follow it
-    for (std::size_t i = 1; i < strips_.size(); ++i) {
-        const Runs& strip = strips_[i].runs;
-        const std::size_t here = runs_.size();
-        for (Run run : strip) {
-            run.group += static_cast<std::uint32_t>(here);
-            runs_.push_back(run);
+void IsolatedFilter::discardSmall(const Strip& strip, int minSize, DisparityImage& image) const {
+    for (std::size_t i = strip.begin; i < strip.end; ++i) {
+        if (runs_[root(i)].size < static_cast<std::uint32_t>(minSize)) {
+            const Run& run = runs_[i];
+            float* d = image.disparity.data() + image.index(0, run.row);
+            std::fill(d + run.first, d + run.last, kNoDisparity);
         }
-        if (here == 0 || strip.empty() || runs_[here - 1].row + 1 != strip.front().row) {
-            continue;
-        }
-        std::size_t above = here;
-        while (above > 0 && runs_[above - 1].row == runs_[here - 1].row) {
-            --above;
-        }
-        std::size_t end = here;
-        while (end < runs_.size() && runs_[end].row == runs_[here].row) {
-            ++end;
-        }
-        joinRows(image, above, here, end, maxDifference, runs_);
     }
 }
 
@@ -110,20 +111,22 @@ void IsolatedFilter::apply(DisparityImage& image, int minSize, float maxDifferen
     if (minSize <= 1 || image.height == 0) {
         return;
     }
+    if (image.disparity.size() > room_) {
+        room_ = image.disparity.size();
+        runs_.reset(new Run[room_]);  // not std::make_unique, which would write to all of it
+    }
     const int strips = std::clamp(tbb::this_task_arena::max_concurrency(), 1, image.height);
-    strips_.resize(static_cast<std::size_t>(strips));
+    strips_.resize(std::max(strips_.size(), static_cast<std::size_t>(strips)));
+    const auto strip = [&](int i) -> Strip& { return strips_[static_cast<std::size_t>(i)]; };
     tbb::parallel_for(0, strips, [&](int i) {
         label(image, i * image.height / strips, (i + 1) * image.height / strips, maxDifference,
-              strips_[static_cast<std::size_t>(i)]);
+              strip(i));
     });
-    joinStrips(image, maxDifference);
-    for (Run& run : runs_) {
-        run.group = runs_[run.group].group;  // an earlier run or itself: the root is there already
-        if (runs_[run.group].size < static_cast<std::uint32_t>(minSize)) {
-            float* d = image.disparity.data() + image.index(0, run.row);
-            std::fill(d + run.first, d + run.last, kNoDisparity);
-        }
+    for (int i = 1; i < strips; ++i) {
+        joinRows(image, strip(i - 1).lastRow, strip(i - 1).end, strip(i).begin, strip(i).secondRow,
+                 maxDifference);
     }
+    tbb::parallel_for(0, strips, [&](int i) { discardSmall(strip(i), minSize, image); });
 }
 
 void discardSilhouettes(DisparityImage& image, int reach, int rows, float step,

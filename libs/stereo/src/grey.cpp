@@ -3,7 +3,7 @@
 
 #include <algorithm>
 #include <bit>
-#include <cmath>
+#include <cstdint>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
@@ -29,29 +29,32 @@ void checkFormat(const cv::Mat& image, const char* which) {
     }
 }
 
-cv::Mat toGrey(const cv::Mat& image) {
+/// The image itself where it is grey already.
+cv::Mat toGrey(const cv::Mat& image, cv::Mat& buffer) {
     if (image.channels() == 1) {
         return image;
     }
-    cv::Mat grey;
-    cv::cvtColor(image, grey, image.channels() == 3 ? cv::COLOR_BGR2GRAY : cv::COLOR_BGRA2GRAY);
-    return grey;
+    cv::cvtColor(image, buffer, image.channels() == 3 ? cv::COLOR_BGR2GRAY : cv::COLOR_BGRA2GRAY);
+    return buffer;
 }
 
 unsigned maxSample(const cv::Mat& grey) {
-    double max = 0;
-    cv::minMaxLoc(grey, nullptr, &max);
-    return static_cast<unsigned>(std::lround(max));
+    std::uint16_t max = 0;
+    for (int r = 0; r < grey.rows; ++r) {
+        const auto* row = grey.ptr<std::uint16_t>(r);
+        max = std::max(max, *std::max_element(row, row + grey.cols));
+    }
+    return max;
 }
 
-cv::Mat shifted(const cv::Mat& grey, int bits) {
-    cv::Mat out(grey.size(), CV_8UC1);
+cv::Mat shifted(const cv::Mat& grey, int bits, cv::Mat& buffer) {
+    buffer.create(grey.size(), CV_8UC1);
     for (int r = 0; r < grey.rows; ++r) {
         const auto* from = grey.ptr<std::uint16_t>(r);
-        std::transform(from, from + grey.cols, out.ptr<std::uint8_t>(r),
+        std::transform(from, from + grey.cols, buffer.ptr<std::uint8_t>(r),
                        [bits](std::uint16_t v) { return static_cast<std::uint8_t>(v >> bits); });
     }
-    return out;
+    return buffer;
 }
 
 }  // namespace
@@ -68,13 +71,13 @@ void toGreyPair(const cv::Mat& left, const cv::Mat& right, GreyPair& out) {
                                     ", right image " + cv::typeToString(right.type()) +
                                     ": a pair has one depth");
     }
-    out.left = toGrey(left);
-    out.right = toGrey(right);
+    out.left = toGrey(left, out.leftBuffers.grey);
+    out.right = toGrey(right, out.rightBuffers.grey);
     if (left.depth() == CV_16U) {
         const unsigned max = std::max(maxSample(out.left), maxSample(out.right));
         const int bits = std::max(0, static_cast<int>(std::bit_width(max)) - 8);
-        out.left = shifted(out.left, bits);
-        out.right = shifted(out.right, bits);
+        out.left = shifted(out.left, bits, out.leftBuffers.bits8);
+        out.right = shifted(out.right, bits, out.rightBuffers.bits8);
     }
 }
 

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <opencv2/core/mat.hpp>
 #include <vector>
 
@@ -16,8 +17,9 @@ namespace riftmap {
 /// fewer than `minSize` pixels lose their disparity.
 ///
 /// Works on runs along the rows; strips of rows are labelled in parallel (oneTBB) and then joined,
-/// which gives the same groups for any number of threads. Keeps its buffers: one object is used by
-/// one thread at a time.
+/// which gives the same groups for any number of threads. Keeps its buffers, which hold as many
+/// runs as an image of the largest size so far can have: one object is used by one thread at a
+/// time.
 class IsolatedFilter {
  public:
     void apply(DisparityImage& image, int minSize, float maxDifference);
@@ -26,27 +28,31 @@ class IsolatedFilter {
     /// Neighbouring pixels of a row, [first, last), that belong together.
     struct Run {
         int row, first, last;
-        std::uint32_t group;  ///< a run of the same group; itself: the group's root
+        std::uint32_t group;  ///< a run of the same group, none later; itself: the group's root
         std::uint32_t size;   ///< of the group [px], where the run is its root
     };
-    using Runs = std::vector<Run>;
+    /// Some rows of the image. Its runs follow one another in runs_ from the index of its first
+    /// pixel on: a run has one pixel at least, so that strips do not get in each other's way.
     struct Strip {
-        Runs runs;
+        std::size_t begin = 0, end = 0;  ///< of its runs
+        std::size_t secondRow = 0;       ///< first run that is not of its first row
+        std::size_t lastRow = 0;         ///< first run of its last row
         std::vector<std::int32_t> ends;  ///< of the runs of a row
     };
 
-    static std::uint32_t root(Runs& runs, std::uint32_t run);
-    static void unite(Runs& runs, std::uint32_t a, std::uint32_t b);
-    static void findRuns(const DisparityImage& image, int row, float maxDifference, Strip& strip);
-    /// Unites the runs [above, here) of a row with the runs [here, end) of the next one.
-    static void joinRows(const DisparityImage& image, std::size_t above, std::size_t here,
-                         std::size_t end, float maxDifference, Runs& runs);
-    static void label(const DisparityImage& image, int first, int last, float maxDifference,
-                      Strip& strip);
-    void joinStrips(const DisparityImage& image, float maxDifference);
+    std::uint32_t root(std::size_t run) const;
+    std::uint32_t halveWay(std::uint32_t run);
+    void unite(std::uint32_t a, std::uint32_t b);
+    void findRuns(const DisparityImage& image, int row, float maxDifference, Strip& strip);
+    /// Unites the runs [above, aboveEnd) of a row with the runs [here, end) of the next one.
+    void joinRows(const DisparityImage& image, std::size_t above, std::size_t aboveEnd,
+                  std::size_t here, std::size_t end, float maxDifference);
+    void label(const DisparityImage& image, int first, int last, float maxDifference, Strip& strip);
+    void discardSmall(const Strip& strip, int minSize, DisparityImage& image) const;
 
     std::vector<Strip> strips_;
-    Runs runs_;  ///< of the whole image
+    std::unique_ptr<Run[]> runs_;  ///< room for one a pixel; what is not used is never touched
+    std::size_t room_ = 0;
 };
 
 /// Largest `rows` of discardSilhouettes() [px].

@@ -16,7 +16,8 @@ namespace riftmap {
 ///
 /// Each stage is an option of [Stereo] and can be switched off. The same bytes for any number of
 /// threads and any instruction set. Rows are matched in parallel (oneTBB, the caller's arena);
-/// nothing is allocated after the first frame of a size, but for the output's own growth.
+/// nothing is allocated after the first frame of a size and format, whatever it shows, but for the
+/// tasks that oneTBB keeps in pools of its own and for `out` where it is not the frame before's.
 class PaperMatcher : public StereoMatcher {
  public:
     /// Throws ConfigError where the window is even.
