@@ -340,10 +340,15 @@ void Association::match(const ViewPoints& view, const GraphOptions& options) {
 }
 
 std::size_t Association::memoryBytes() const {
-    return u_.capacity() * (4 * sizeof(float) + sizeof(pixelOf_[0])) +
-           claims.capacity() * sizeof(Claims) +
-           entryU_.capacity() * (4 * sizeof(float) + sizeof(entryCandidate_[0])) +
-           (start_.capacity() + matchOf.capacity()) * sizeof(std::uint32_t);
+    std::size_t bytes = bytesOf(pages) + bytesOf(matchOf) + bytesOf(claims) + bytesOf(ownReach_) +
+                        bytesOf(reach_) + bytesOf(u_) + bytesOf(v_) + bytesOf(z_) +
+                        bytesOf(sigma_) + bytesOf(pixelOf_) + bytesOf(inView_) + bytesOf(rowsOf_) +
+                        bytesOf(entryU_) + bytesOf(entryV_) + bytesOf(entryZ_) +
+                        bytesOf(entryNoise_) + bytesOf(entryCandidate_) + bytesOf(start_);
+    for (const Strip& strip : strips_) {
+        bytes += bytesOf(strip.foreign) + bytesOf(strip.distance) + bytesOf(strip.found);
+    }
+    return bytes;
 }
 
 }  // namespace riftmap

@@ -21,16 +21,19 @@ constexpr PageBounds emptyBounds() {
 
 }  // namespace
 
-GraphStorage::GraphStorage(double blockSize) : blockSize_(blockSize) {}
+GraphStorage::GraphStorage(double blockSize)
+    : blockSize_(blockSize), levelScale_(static_cast<float>(kAcross / blockSize)) {}
 
 GraphStorage::GraphStorage(const GraphStorage& other)
     : blockSize_(other.blockSize_),
+      levelScale_(other.levelScale_),
+      levels_(other.levels_),
       pageCount_(other.pageCount_),
       bounds_(other.bounds_),
       freePages_(other.freePages_),
       blocks_(other.blocks_),
       blockOfKey_(other.blockOfKey_),
-      edgeChunks_(other.edgeChunks_),
+      edgeChunkCount_(other.edgeChunkCount_),
       freeEdgeChunk_(other.freeEdgeChunk_),
       overhang_(other.overhang_),
       vertexCount_(other.vertexCount_),
@@ -40,9 +43,12 @@ GraphStorage::GraphStorage(const GraphStorage& other)
         std::uninitialized_copy_n(&other.page(first), std::min(kPagesPerChunk, pageCount_ - first),
                                   chunks_.back().get());
     }
+    for (const auto& piece : other.edgePieces_) {
+        edgePieces_.push_back(std::make_unique<EdgePiece>(*piece));
+    }
 }
 
-std::size_t GraphStorage::KeyHash::operator()(const std::array<std::int32_t, 3>& k) const {
+std::size_t GraphStorage::KeyHash::operator()(const BlockKey& k) const {
     std::uint64_t h = 0;
     for (const std::int32_t v : k) {
         h = (h ^ static_cast<std::uint32_t>(v)) * 0x9E3779B97F4A7C15ULL;
@@ -51,36 +57,39 @@ std::size_t GraphStorage::KeyHash::operator()(const std::array<std::int32_t, 3>&
     return h;
 }
 
-std::array<std::int32_t, 3> GraphStorage::keyOf(const Eigen::Vector3f& p) const {
-    const auto cell = [this](float v) {
+BlockKey GraphStorage::keyOf(const Eigen::Vector3f& p, std::int32_t level) const {
+    const double edge = blockEdge(level);
+    const auto cell = [edge](float v) {
         constexpr double kLimit = 2e9;
         return static_cast<std::int32_t>(
-            std::clamp(std::floor(static_cast<double>(v) / blockSize_), -kLimit, kLimit));
+            std::clamp(std::floor(static_cast<double>(v) / edge), -kLimit, kLimit));
     };
-    return {cell(p.x()), cell(p.y()), cell(p.z())};
+    return {cell(p.x()), cell(p.y()), cell(p.z()), level};
 }
 
-GraphStorage::Cube GraphStorage::cubeOf(const Eigen::Vector3f& p) const {
+GraphStorage::Cube GraphStorage::cubeOf(const Eigen::Vector3f& p, std::int32_t level) const {
     Cube cube;
-    cube.key = keyOf(p);
+    cube.key = keyOf(p, level);
+    const double edge = blockEdge(level);
     const Eigen::Vector3d key(cube.key[0], cube.key[1], cube.key[2]);
-    const Eigen::Vector3d rounding = 1e-12 * (key.cwiseAbs().array() + 1.0) * blockSize_;
-    cube.low = key * blockSize_ + rounding;
-    cube.high = (key.array() + 1.0).matrix() * blockSize_ - rounding;
+    const Eigen::Vector3d rounding = 1e-12 * (key.cwiseAbs().array() + 1.0) * edge;
+    cube.low = key * edge + rounding;
+    cube.high = (key.array() + 1.0).matrix() * edge - rounding;
     return cube;
 }
 
-std::uint32_t GraphStorage::findBlock(const std::array<std::int32_t, 3>& key) const {
+std::uint32_t GraphStorage::findBlock(const BlockKey& key) const {
     const auto it = blockOfKey_.find(key);
     return it == blockOfKey_.end() ? kNoBlock : it->second;
 }
 
-std::uint32_t GraphStorage::blockAt(const std::array<std::int32_t, 3>& key) {
+std::uint32_t GraphStorage::blockAt(const BlockKey& key) {
     const auto [it, fresh] = blockOfKey_.try_emplace(key, static_cast<std::uint32_t>(0));
     if (fresh) {
         it->second = static_cast<std::uint32_t>(blocks_.size());
         blocks_.emplace_back();
         blocks_.back().key = key;
+        levels_ = std::max(levels_, key[3] + 1);
     }
     return it->second;
 }
@@ -201,15 +210,15 @@ void GraphStorage::updateBlockBounds(std::uint32_t block) {
         }
     }
     for (std::size_t i = 0; i < 3 && !b.pages.empty(); ++i) {
-        const double low = b.key[i] * blockSize_, high = low + blockSize_;
+        const double edge = blockEdge(b.key[3]), low = b.key[i] * edge, high = low + edge;
         overhang_ = std::max({overhang_, low - static_cast<double>(b.bounds.min[i]),
                               static_cast<double>(b.bounds.max[i]) - high});
     }
 }
 
 std::uint16_t* GraphStorage::findInChunks(std::uint32_t first, VertexId b) {
-    for (std::uint32_t c = first; c != EdgeChunk::kNone; c = edgeChunks_[c].next) {
-        EdgeChunk& chunk = edgeChunks_[c];
+    for (std::uint32_t c = first; c != EdgeChunk::kNone; c = edgeChunk(c).next) {
+        EdgeChunk& chunk = edgeChunk(c);
         for (std::uint32_t i = 0; i < EdgeChunk::kSize; ++i) {
             if (chunk.neighbour[i] == b) {
                 return &chunk.weight[i];
@@ -245,20 +254,22 @@ void GraphStorage::appendInline(VertexId a, VertexId b, std::uint16_t weight) {
 std::uint32_t GraphStorage::newEdgeChunk() {
     std::uint32_t c = freeEdgeChunk_;
     if (c == EdgeChunk::kNone) {
-        c = static_cast<std::uint32_t>(edgeChunks_.size());
-        edgeChunks_.emplace_back();
+        c = edgeChunkCount_++;
+        if (c % kEdgeChunksPerPiece == 0) {
+            edgePieces_.push_back(std::make_unique<EdgePiece>());
+        }
     } else {
-        freeEdgeChunk_ = edgeChunks_[c].next;
+        freeEdgeChunk_ = edgeChunk(c).next;
     }
-    edgeChunks_[c].neighbour.fill(kNoVertex);
-    edgeChunks_[c].next = EdgeChunk::kNone;
+    edgeChunk(c).neighbour.fill(kNoVertex);
+    edgeChunk(c).next = EdgeChunk::kNone;
     return c;
 }
 
 void GraphStorage::freeEdgeChunks(std::uint32_t first) {
     while (first != EdgeChunk::kNone) {
-        const std::uint32_t next = edgeChunks_[first].next;
-        edgeChunks_[first].next = freeEdgeChunk_;
+        const std::uint32_t next = edgeChunk(first).next;
+        edgeChunk(first).next = freeEdgeChunk_;
         freeEdgeChunk_ = first;
         first = next;
     }
@@ -275,26 +286,26 @@ void GraphStorage::appendHalfEdge(VertexId a, VertexId b, std::uint16_t weight) 
             return;
         }
         const std::uint32_t c = newEdgeChunk();
-        edgeChunks_[c].neighbour[0] = neighbour[kLast];
-        edgeChunks_[c].weight[0] = p.weight[slot][kLast];
+        edgeChunk(c).neighbour[0] = neighbour[kLast];
+        edgeChunk(c).weight[0] = p.weight[slot][kLast];
         neighbour[kLast] = c;
         p.state[slot] |= kOverflow;
     }
     std::uint32_t c = neighbour[kLast];
-    while (edgeChunks_[c].next != EdgeChunk::kNone) {
-        c = edgeChunks_[c].next;
+    while (edgeChunk(c).next != EdgeChunk::kNone) {
+        c = edgeChunk(c).next;
     }
-    if (edgeChunks_[c].neighbour[EdgeChunk::kSize - 1] != kNoVertex) {
+    if (edgeChunk(c).neighbour[EdgeChunk::kSize - 1] != kNoVertex) {
         const std::uint32_t fresh = newEdgeChunk();
-        edgeChunks_[c].next = fresh;
+        edgeChunk(c).next = fresh;
         c = fresh;
     }
     std::uint32_t i = 0;
-    while (edgeChunks_[c].neighbour[i] != kNoVertex) {
+    while (edgeChunk(c).neighbour[i] != kNoVertex) {
         ++i;
     }
-    edgeChunks_[c].neighbour[i] = b;
-    edgeChunks_[c].weight[i] = weight;
+    edgeChunk(c).neighbour[i] = b;
+    edgeChunk(c).weight[i] = weight;
 }
 
 void GraphStorage::addEdge(VertexId a, VertexId b, std::uint16_t weight) {
@@ -349,7 +360,7 @@ std::size_t GraphStorage::memoryBytes() const {
         // the first chunk is resident as far as it is used
         (chunks_.size() <= 1 ? pageCount_ * sizeof(Page) : chunks_.size() * kChunkBytes) +
         chunks_.capacity() * sizeof(chunks_[0]) + freePages_.capacity() * sizeof(std::uint32_t) +
-        blocks_.capacity() * sizeof(Block) + edgeChunks_.capacity() * sizeof(EdgeChunk) +
+        blocks_.capacity() * sizeof(Block) + edgePieces_.size() * sizeof(EdgePiece) +
         // a node and a bucket an entry, as libstdc++ has them
         blockOfKey_.size() * (sizeof(*blockOfKey_.begin()) + 2 * sizeof(void*)) +
         blockOfKey_.bucket_count() * sizeof(void*);

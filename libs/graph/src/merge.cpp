@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstddef>
+#include <iterator>
 
 #include "edge_kernel.h"
 #include "fuse_kernel.h"
@@ -20,7 +21,7 @@ namespace {
 constexpr float kNoiseFactor = 3.0F;                     // standard deviations
 constexpr unsigned kDeletingEvidence = 2;                // views
 constexpr std::uint32_t kWellConnected = Page::kInline;  // edges of a pixel
-constexpr std::uint32_t kMostEdges = 9;                  // what fits without a second chunk
+constexpr std::uint32_t kMostEdges = 9;                  // of a vertex, but in paper mode
 constexpr std::uint32_t kPagesAtOnce = 16;
 constexpr int kRowsAtOnce = 8;
 constexpr int kTile = 8;
@@ -348,8 +349,9 @@ void Merger::findFresh(const GraphStorage& storage, int strip) {
                     continue;
                 }
                 const Eigen::Vector3f p = points_.inMap(c, r);
-                if (fresh.runs.empty() || !cube.surelyHolds(p)) {
-                    cube = storage.cubeOf(p);
+                const std::int32_t level = storage.levelOf(points_.z[i] * points_.footprint);
+                if (fresh.runs.empty() || cube.key[3] != level || !cube.surelyHolds(p)) {
+                    cube = storage.cubeOf(p, level);
                 }
                 if (fresh.runs.empty() || fresh.runs.back().first != cube.key) {
                     fresh.runs.emplace_back(cube.key, 0U);
@@ -453,7 +455,7 @@ bool Merger::wanted(const GraphStorage& storage, const NewEdge& e) const {
 /// map has, lists those it lacks. What becomes of an edge cannot be foretold, so each step passes
 /// on those that are left to the next: there are no branches to guess wrong.
 void Merger::compareEdges(GraphStorage& storage, int strip) {
-    EdgeStrip& lists = edgeStrips_[static_cast<std::size_t>(strip)];
+    thread_local EdgeScratch lists;
     const int first = strip * kRowsAtOnce, end = std::min(points_.height, first + kRowsAtOnce);
     const auto w = static_cast<std::size_t>(points_.width);
     const std::size_t line = points_.index(0, first);
@@ -468,7 +470,7 @@ void Merger::compareEdges(GraphStorage& storage, int strip) {
                            a + count, b + count, code + count);
     }
     NewEdge* missing = lists.missing.data();
-    EdgeStrip::Lower* lower = lists.lower.data();
+    EdgeScratch::Lower* lower = lists.lower.data();
     for (std::size_t e = 0; e < count; ++e) {
         constexpr std::size_t kAhead = 16;
         storage.prefetchEdges(a[std::min(e + kAhead, count - 1)]);
@@ -486,17 +488,19 @@ void Merger::compareEdges(GraphStorage& storage, int strip) {
             lowerWeight(*storage.findHalfEdge(l->b, l->a), l->code);
         }
     }
-    missing = std::remove_if(lists.missing.data(), missing,
-                             [&](const NewEdge& e) { return !wanted(storage, e); });
-    lists.lacking = static_cast<std::size_t>(missing - lists.missing.data());
+    auto& result = missingEdges_[static_cast<std::size_t>(strip)];
+    result.clear();
+    std::copy_if(lists.missing.data(), missing, std::back_inserter(result),
+                 [&](const NewEdge& e) { return wanted(storage, e); });
 }
 
 void Merger::connectMatched(GraphStorage& storage, MergeResult& result) {
-    edgeStrips_.resize((static_cast<std::size_t>(points_.height) + kRowsAtOnce - 1) / kRowsAtOnce);
-    forEach(edgeStrips_.size(), 1,
+    missingEdges_.resize((static_cast<std::size_t>(points_.height) + kRowsAtOnce - 1) /
+                         kRowsAtOnce);
+    forEach(missingEdges_.size(), 1,
             [&](std::size_t strip) { compareEdges(storage, static_cast<int>(strip)); });
-    for (const EdgeStrip& strip : edgeStrips_) {
-        for (const NewEdge& e : strip.wanted()) {
+    for (const auto& strip : missingEdges_) {
+        for (const NewEdge& e : strip) {
             if (std::uint16_t* there = storage.findHalfEdge(e.a, e.b)) {
                 lowerWeight(*there, e.code);
                 lowerWeight(*storage.findHalfEdge(e.b, e.a), e.code);
@@ -533,8 +537,8 @@ void Merger::refreshNormals(GraphStorage& storage) {
     });
     if (paper()) {  // positions stay, but neighbours were added
         std::vector<VertexId> ends;
-        for (const EdgeStrip& strip : edgeStrips_) {
-            for (const NewEdge& e : strip.wanted()) {
+        for (const auto& strip : missingEdges_) {
+            for (const NewEdge& e : strip) {
                 ends.push_back(e.a);
                 ends.push_back(e.b);
             }
@@ -569,8 +573,8 @@ void Merger::finish(GraphStorage& storage, RiftFinder& rifts, std::int64_t& area
             rifts.touch(storage.page(index).block);
         }
     }
-    for (const EdgeStrip& strip : edgeStrips_) {
-        for (const NewEdge& e : strip.wanted()) {
+    for (const auto& strip : missingEdges_) {
+        for (const NewEdge& e : strip) {
             rifts.touch(storage.page(GraphStorage::pageOf(e.a)).block);
             rifts.touch(storage.page(GraphStorage::pageOf(e.b)).block);
         }
@@ -588,10 +592,16 @@ void Merger::finish(GraphStorage& storage, RiftFinder& rifts, std::int64_t& area
 }
 
 std::size_t Merger::memoryBytes() const {
-    const std::size_t pixels = points_.z.capacity();
-    return pixels * (3 * sizeof(float) + 2 * sizeof(std::uint16_t) + 2 + 5 * sizeof(VertexId)) +
-           points_.patches.capacity() * sizeof(PatchPlane) + seen_.memoryBytes() +
-           work_.capacity() * sizeof(PageWork);
+    std::size_t bytes = points_.memoryBytes() + seen_.memoryBytes() + bytesOf(work_) +
+                        bytesOf(vertexOf_) + bytesOf(fresh_) + bytesOf(freshIds_) +
+                        bytesOf(isFresh_) + bytesOf(touchedBlocks_) + bytesOf(freshPages_);
+    for (const FreshStrip& strip : freshStrips_) {
+        bytes += bytesOf(strip.pixels) + bytesOf(strip.runs);
+    }
+    for (const auto& strip : missingEdges_) {
+        bytes += bytesOf(strip);
+    }
+    return bytes;
 }
 
 }  // namespace riftmap

@@ -45,21 +45,19 @@ class Merger {
     struct FreshStrip {
         std::vector<std::uint32_t> pixels;  ///< that become vertices
         /// The blocks of these pixels: key, how many in a row.
-        std::vector<std::pair<std::array<std::int32_t, 3>, std::uint32_t>> runs;
+        std::vector<std::pair<BlockKey, std::uint32_t>> runs;
     };
-    struct EdgeStrip {
+    /// What compareEdges() works on; one a thread, only the first so many elements count.
+    struct EdgeScratch {
         struct Lower {
             std::uint16_t* there;
             VertexId a, b;
             std::uint16_t code;
         };
-        // Buffers; only the first so many elements count.
         std::vector<VertexId> a, b;
         std::vector<std::uint32_t> code;
         std::vector<Lower> lower;      ///< edges that the map has with a larger weight
         std::vector<NewEdge> missing;  ///< those that it lacks
-        std::size_t lacking = 0;
-        std::span<const NewEdge> wanted() const { return {missing.data(), lacking}; }
         void resize(std::size_t n) {
             a.resize(n);
             b.resize(n);
@@ -111,7 +109,7 @@ class Merger {
     std::vector<std::uint32_t> touchedBlocks_;
     std::vector<std::uint32_t> freshPages_;
     std::vector<FreshStrip> freshStrips_;
-    std::vector<EdgeStrip> edgeStrips_;
+    std::vector<std::vector<NewEdge>> missingEdges_;  ///< of strips of rows
 };
 
 }  // namespace riftmap

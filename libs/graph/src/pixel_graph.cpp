@@ -74,8 +74,15 @@ std::size_t PixelGraph::rawPointCount() const {
 }
 
 std::size_t PixelGraph::memoryBytes() const {
-    return sizeof(Impl) + impl_->storage.memoryBytes() + impl_->rifts.memoryBytes() +
-           impl_->merger.memoryBytes();
+    return sizeof(Impl) + impl_->storage.memoryBytes() + impl_->rifts.memoryBytes();
+}
+
+std::size_t PixelGraph::bufferBytes() const {
+    return impl_->merger.memoryBytes();
+}
+
+void PixelGraph::releaseBuffers() {
+    impl_->merger = Merger(impl_->options);
 }
 
 double PixelGraph::surfaceArea() const {

@@ -11,6 +11,15 @@ namespace riftmap {
 class PixelGraph::Impl {
  public:
     explicit Impl(const GraphOptions& o) : options(o), storage(o.blockSize), rifts(o), merger(o) {}
+    Impl(const Impl& other)
+        : options(other.options),
+          storage(other.storage),
+          rifts(other.rifts),
+          merger(other.options),
+          rawPoints(other.rawPoints),
+          area(other.area) {}
+    Impl& operator=(const Impl&) = delete;
+    ~Impl() = default;
 
     GraphOptions options;
     GraphStorage storage;

@@ -40,8 +40,8 @@ bool hasHighEdge(const GraphStorage& storage, VertexId id) {
     return high;
 }
 
-std::int32_t floorDivide(std::int32_t a, std::int32_t b) {
-    return a >= 0 ? a / b : -((-a + b - 1) / b);
+std::int32_t floorDivide(std::int64_t a, std::int32_t b) {
+    return static_cast<std::int32_t>(a >= 0 ? a / b : -((-a + b - 1) / b));
 }
 
 }  // namespace
@@ -61,7 +61,9 @@ std::uint32_t RiftFinder::cellOf(const GraphStorage& storage, std::uint32_t bloc
     std::array<std::int32_t, 3> key{};
     std::uint64_t hash = 0;
     for (std::size_t i = 0; blocksPerCell_ > 0 && i < 3; ++i) {
-        key[i] = floorDivide(storage.blocks()[block].key[i], blocksPerCell_);
+        // A block that is larger than a cell belongs to that of its lowest corner.
+        const BlockKey& of = storage.blocks()[block].key;
+        key[i] = floorDivide(std::int64_t{of[i]} << of[3], blocksPerCell_);
         hash = (hash << 21U) ^ (static_cast<std::uint32_t>(key[i]) & 0x1FFFFFU);
     }
     // Keys beyond 2^20 cells would share a hash: chain on to the next free number.
@@ -160,6 +162,7 @@ std::vector<Rift> RiftFinder::find(const GraphStorage& storage, std::uint32_t ce
     }
     for (std::uint32_t r = 0; r < rifts.size(); ++r) {
         Rift& rift = rifts[r];
+        rift.vertices.shrink_to_fit();  // kept for as long as its cell is at rest
         std::sort(rift.vertices.begin(), rift.vertices.end());
         Eigen::Vector3d centre = Eigen::Vector3d::Zero();
         Eigen::Vector3d normal = Eigen::Vector3d::Zero();

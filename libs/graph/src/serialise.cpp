@@ -21,7 +21,7 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "maps are saved little-endian");
 
 constexpr std::array<char, 8> kMagic = {'R', 'I', 'F', 'T', 'G', 'R', 'P', 'H'};
-constexpr std::uint32_t kVersion = 1;
+constexpr std::uint32_t kVersion = 2;
 constexpr std::size_t kPageBytes = offsetof(Page, alive);  // the arrays of a page
 constexpr std::size_t kBlocksAtOnce = 64;
 
@@ -139,7 +139,7 @@ Bytes blockBytes(const GraphStorage& storage, const Block& block) {
 /// block then.
 void restoreBlock(GraphStorage& storage, const Bytes& bytes) {
     Reader in(bytes);
-    const std::uint32_t block = storage.blockAt(in.get<std::array<std::int32_t, 3>>());
+    const std::uint32_t block = storage.blockAt(in.get<BlockKey>());
     std::vector<std::uint32_t> pages;
     try {
         for (auto left = in.get<std::uint32_t>(); left > 0; --left) {
@@ -177,9 +177,10 @@ void restoreBlock(GraphStorage& storage, const Bytes& bytes) {
     storage.blocks()[block].pages = std::move(pages);
 }
 
-std::string keyName(const std::array<std::int32_t, 3>& key) {
+std::string keyName(const BlockKey& key) {
     std::ostringstream s;
-    s << '(' << key[0] << ", " << key[1] << ", " << key[2] << ')';
+    s << '(' << key[0] << ", " << key[1] << ", " << key[2] << ')'
+      << (key[3] > 0 ? " level " + std::to_string(key[3]) : "");
     return s.str();
 }
 
@@ -206,7 +207,7 @@ void PixelGraph::save(std::ostream& out) const {
     put(directory, static_cast<std::uint32_t>(blocks.size()));
     std::vector<std::uint64_t> sizes(blocks.size());
     parallelFor(blocks.size(), 1, [&](std::size_t b, std::size_t) {
-        sizes[b] = 20 + blocks[b].pages.size() * (kPageBytes + 12);
+        sizes[b] = 24 + blocks[b].pages.size() * (kPageBytes + 12);
         for (const std::uint32_t index : blocks[b].pages) {
             const Page& page = storage.page(index);
             forEachBit(page.alive, [&](std::uint32_t slot) {
@@ -307,11 +308,14 @@ void PixelGraph::load(std::istream& in) {
         damage += (damage.empty() ? "" : "; ") + what;
     };
     const auto blockCount = entries.get<std::uint32_t>();
-    std::vector<std::array<std::int32_t, 3>> keys(blockCount);
+    std::vector<BlockKey> keys(blockCount);
     std::vector<std::uint64_t> lengths(blockCount);
     for (std::uint32_t b = 0; b < blockCount; ++b) {
-        keys[b] = entries.get<std::array<std::int32_t, 3>>();
+        keys[b] = entries.get<BlockKey>();
         lengths[b] = entries.get<std::uint64_t>();
+        if (keys[b][3] < 0 || keys[b][3] >= GraphStorage::kLevels) {
+            fail("the directory of blocks is damaged");
+        }
         fresh->storage.blockAt(keys[b]);  // the same index as before
     }
     for (std::uint32_t b = 0; b < blockCount; ++b) {

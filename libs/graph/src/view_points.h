@@ -14,6 +14,12 @@
 
 namespace riftmap {
 
+/// Allocated for a vector.
+template <class T>
+std::size_t bytesOf(const std::vector<T>& values) {
+    return values.capacity() * sizeof(T);
+}
+
 /// A plane through a patch of the disparity image (planes are linear in disparity):
 /// disparity = slopeColumn * dc + slopeRow * dr + value, (dc, dr) from the centre pixel.
 struct PatchPlane {
@@ -56,6 +62,11 @@ class ViewPoints {
     std::vector<std::uint8_t> kinds;         ///< OpenKind bits but kTooCoarse
     std::vector<PatchPlane> patches;         ///< a plane a patch, row-major
 
+    std::size_t memoryBytes() const {
+        return bytesOf(z) + bytesOf(sigma) + bytesOf(disparity) + bytesOf(stretch) + bytesOf(area) +
+               bytesOf(right) + bytesOf(down) + bytesOf(kinds) + bytesOf(patches) + bytesOf(rayX_) +
+               bytesOf(rayY_) + bytesOf(phases_);
+    }
     std::size_t index(int column, int row) const {
         return static_cast<std::size_t>(row) * static_cast<std::size_t>(width) +
                static_cast<std::size_t>(column);

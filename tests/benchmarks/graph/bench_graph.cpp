@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Time and memory of the pixel graph, and of OctoMap on the same points.
-//   bench-graph [--csv FILE] [--vertices N] [--quick]
+//   bench-graph [--csv FILE] [--vertices N] [--quick] [--recordings]
 #include <malloc.h>
 #include <octomap/octomap.h>
 #include <tbb/parallel_for.h>
@@ -9,6 +9,7 @@
 #include <chrono>
 #include <cstdlib>
 #include <ctime>
+#include <filesystem>
 #include <fstream>
 #include <iomanip>
 #include <iostream>
@@ -18,6 +19,7 @@
 #include <vector>
 
 #include "astar_comparison.h"
+#include "recorded_memory.h"
 #include "riftmap/graph/pixel_graph.h"
 #include "synthetic_views.h"
 
@@ -27,6 +29,7 @@ using riftmap::GraphOptions;
 using riftmap::MergeTimes;
 using riftmap::PixelGraph;
 using riftmap::Pose;
+using riftmap::residentBytes;
 using riftmap::VertexId;
 using riftmap::View;
 namespace synthetic = riftmap::synthetic;
@@ -50,15 +53,6 @@ double cpuMs() {
 double median(std::vector<double> v) {
     std::sort(v.begin(), v.end());
     return v.empty() ? std::numeric_limits<double>::quiet_NaN() : v[v.size() / 2];
-}
-
-/// Resident memory of this process [bytes].
-double residentBytes() {
-    malloc_trim(0);
-    std::ifstream statm("/proc/self/statm");
-    double total = 0, resident = 0;
-    statm >> total >> resident;
-    return resident * 4096;
 }
 
 /// Collects `figure,value,unit` rows and says them as they come.
@@ -247,6 +241,36 @@ bool searches(Report& report) {
     return c.largestDifference < 1e-9;
 }
 
+/// Maps of what others recorded, also in blocks far smaller than the configuration asks for.
+void recordings(Report& report) {
+    const char* given = std::getenv("RIFTMAP_DATA");
+    const std::string source = RIFTMAP_SOURCE_DIR;
+    const std::string data = given != nullptr ? given : source + "/../shared/data";
+    struct Recording {
+        std::string kind, folder;
+        double blockSize;
+    };
+    for (const auto& [kind, folder, blockSize] :
+         {Recording{"kitti", "kitti_odometry/sequence_1", 0},
+          {"kitti", "kitti_odometry/sequence_1", 0.5},
+          {"euroc", "euroc_v1_01_micro", 0}}) {
+        if (!std::filesystem::is_directory(data + "/" + folder)) {
+            std::cout << "SKIPPED: no " << data << '/' << folder << " (set RIFTMAP_DATA)\n";
+            continue;
+        }
+        const riftmap::RecordedMemory m = riftmap::recordedMemory(
+            kind, data + "/" + folder, source + "/config/" + kind + ".ini", blockSize);
+        const std::string name = kind + (blockSize > 0 ? "_small_blocks_" : "_");
+        const auto vertices = static_cast<double>(m.vertices);
+        report.add(name + "vertices", vertices, "1");
+        report.add(name + "bytes_per_vertex", m.mapBytes / vertices, "B");
+        report.add(name + "bytes_per_vertex_counted", m.countedBytes / vertices, "B");
+        report.add(name + "buffers_mb", m.bufferBytes / 1e6, "MB");
+        report.add(name + "merge_ms_median", m.mergeMs, "ms");
+        report.add(name + "rifts_ms_median", m.riftsMs, "ms");
+    }
+}
+
 /// What memory can deliver: reads and writes of large arrays by two threads [GB/s].
 double bandwidth() {
     std::vector<std::uint64_t> data(std::size_t{32} << 20U, 1);
@@ -276,12 +300,16 @@ int main(int argc, char** argv) {
             csv = argv[++i];
         } else if (arg == "--vertices" && i + 1 < argc) {
             vertices = std::stoul(argv[++i]);
+        } else if (arg == "--recordings") {
+            Report memory;
+            recordings(memory);
+            return csv.empty() || memory.write(csv) ? 0 : 1;
         } else if (arg == "--quick") {
             vertices = 1'000'000;
             octomapViews = 0;
         } else {
             std::cerr << "bench-graph: unknown argument " << arg
-                      << ", allowed: --csv FILE, --vertices N, --quick\n";
+                      << ", allowed: --csv FILE, --vertices N, --quick, --recordings\n";
             return 2;
         }
     }
@@ -303,6 +331,7 @@ int main(int argc, char** argv) {
     }
     large.print("revisit, large map");
     const double perVertex = (residentBytes() - before) / static_cast<double>(graph.vertexCount());
+    const double buffers = static_cast<double>(graph.bufferBytes());
     for (const View& view : explorations(scene, 15)) {
         exploring.take(graph, view);
     }
@@ -322,12 +351,16 @@ int main(int argc, char** argv) {
     report.add("bytes_per_vertex_counted",
                static_cast<double>(graph.memoryBytes()) / static_cast<double>(graph.vertexCount()),
                "B");
+    report.add("buffers_mb_counted", buffers / 1e6, "MB");
     queries(graph, report);
     saveAndLoad(graph, report);
     graph.clear();
     secondLap(report, 24);
     if (octomapViews > 0) {
         againstOctoMap(scene, report, octomapViews);
+    }
+    if (octomapViews > 0) {
+        recordings(report);
     }
     const bool sameLengths = searches(report);
     report.add("bandwidth_gb_per_s", bandwidth(), "GB/s");

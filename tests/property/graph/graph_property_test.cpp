@@ -79,10 +79,11 @@ class SlowRifts {
         }
         const GraphStorage& s = graph_.storage();
         const auto& key = s.blocks()[s.page(GraphStorage::pageOf(id)).block].key;
-        const double blocks = std::round(o.riftExtent / o.blockSize);
-        return {static_cast<int>(std::floor(key[0] / blocks)),
-                static_cast<int>(std::floor(key[1] / blocks)),
-                static_cast<int>(std::floor(key[2] / blocks))};
+        // Of the block's lowest corner.
+        const double cells = std::exp2(key[3]) / std::round(o.riftExtent / o.blockSize);
+        return {static_cast<int>(std::floor(key[0] * cells)),
+                static_cast<int>(std::floor(key[1] * cells)),
+                static_cast<int>(std::floor(key[2] * cells))};
     }
     const PixelGraph& graph_;
 };
@@ -351,7 +352,7 @@ TEST(GraphProperty, NormalIsTheSmallestSingularVector) {
         const Eigen::Vector3d n = random.point(1).normalized();
         const Eigen::Vector3d u = n.unitOrthogonal(), v = n.cross(u);
         const Eigen::Vector3d centre = random.point(5);
-        const std::uint32_t block = storage.blockAt({0, 0, 0});
+        const std::uint32_t block = storage.blockAt({0, 0, 0, 0});
         const int k = 3 + random.below(6);
         Eigen::MatrixXd q(k, 3);
         std::vector<VertexId> ids;

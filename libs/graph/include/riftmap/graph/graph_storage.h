@@ -99,17 +99,22 @@ struct Page {
     }
 };
 
+/// Names a cube of space: x, y, z = floor(position / edge), and the level; edge = blockSize
+/// 2^level. Surface sampled coarsely, because it was seen from far, lies in larger cubes, so that a
+/// block holds about as many vertices everywhere.
+using BlockKey = std::array<std::int32_t, 4>;
+
 /// A cube of space and the pages that hold its vertices.
 struct Block {
-    std::array<std::int32_t, 3> key{};  ///< floor(position / blockSize) at creation of a vertex
-    PageBounds bounds;                  ///< of its vertices; fusion may leave the cube
-    std::vector<std::uint32_t> pages;   ///< ascending in age
+    BlockKey key{};                    ///< of a vertex' position when it was made
+    PageBounds bounds;                 ///< of its vertices; fusion may leave the cube
+    std::vector<std::uint32_t> pages;  ///< ascending in age
     std::uint32_t vertices = 0;
 };
 
 /// Further half-edges of a vertex that has more than fit inline.
 struct EdgeChunk {
-    static constexpr std::uint32_t kSize = 6;
+    static constexpr std::uint32_t kSize = 4;
     static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
     std::array<VertexId, kSize> neighbour{};
     std::array<std::uint16_t, kSize> weight{};
@@ -162,21 +167,31 @@ class GraphStorage {
     }
     Eigen::Vector3f position(VertexId id) const { return page(pageOf(id)).position(slotOf(id)); }
 
-    std::array<std::int32_t, 3> keyOf(const Eigen::Vector3f& p) const;
+    static constexpr std::int32_t kLevels = 12;
+    /// The level whose blocks are at least kAcross vertices wide that lie `spacing` apart [m].
+    std::int32_t levelOf(float spacing) const {
+        const float ratio = spacing * levelScale_;
+        if (!(ratio >= 1.0F)) {
+            return 0;
+        }
+        const auto log2 = static_cast<std::int32_t>(std::bit_cast<std::uint32_t>(ratio) >> 23U);
+        return std::min(kLevels - 1, log2 - 126);
+    }
+    BlockKey keyOf(const Eigen::Vector3f& p, std::int32_t level = 0) const;
     /// The cube of a block, to save keyOf() for points that surely lie inside.
     struct Cube {
-        std::array<std::int32_t, 3> key{};
+        BlockKey key{};
         Eigen::Vector3d low, high;
         bool surelyHolds(const Eigen::Vector3f& p) const {
             const Eigen::Vector3d q = p.cast<double>();
             return (q.array() > low.array()).all() && (q.array() < high.array()).all();
         }
     };
-    Cube cubeOf(const Eigen::Vector3f& p) const;
+    Cube cubeOf(const Eigen::Vector3f& p, std::int32_t level) const;
     /// Index of the block with this key; made if there is none.
-    std::uint32_t blockAt(const std::array<std::int32_t, 3>& key);
+    std::uint32_t blockAt(const BlockKey& key);
     /// Index of the block with this key, or kNoBlock.
-    std::uint32_t findBlock(const std::array<std::int32_t, 3>& key) const;
+    std::uint32_t findBlock(const BlockKey& key) const;
     static constexpr std::uint32_t kNoBlock = 0xFFFFFFFFU;
 
     /// A living vertex without edges; the caller fills the arrays. Reuses freed slots.
@@ -250,7 +265,7 @@ class GraphStorage {
             return;
         }
         for (std::uint32_t c = neighbour[Page::kInline - 1]; c != EdgeChunk::kNone;) {
-            const EdgeChunk& chunk = edgeChunks_[c];
+            const EdgeChunk& chunk = edgeChunk(c);
             for (std::uint32_t i = 0; i < EdgeChunk::kSize; ++i) {
                 if (chunk.neighbour[i] == kNoVertex) {
                     return;
@@ -278,9 +293,6 @@ class GraphStorage {
     /// Counts of edges made by appendInline, which leaves the counting to its caller.
     void countEdges(std::size_t added) { edgeCount_ += added; }
 
-    std::vector<EdgeChunk>& edgeChunks() { return edgeChunks_; }
-    const std::vector<EdgeChunk>& edgeChunks() const { return edgeChunks_; }
-
     /// For loading: makes pages up to this index exist, dead and without a block.
     void reservePages(std::uint32_t count);
     /// For loading: after pages were filled in, counts everything again and drops edges that lead
@@ -299,7 +311,7 @@ class GraphStorage {
     PageChunk newChunk() const;
 
     struct KeyHash {
-        std::size_t operator()(const std::array<std::int32_t, 3>& k) const;
+        std::size_t operator()(const BlockKey& k) const;
     };
 
     std::uint16_t* findInChunks(std::uint32_t first, VertexId b);
@@ -309,14 +321,31 @@ class GraphStorage {
     void freeEdgeChunks(std::uint32_t first);
     std::uint32_t newPage(std::uint32_t block);
 
+    static constexpr double kAcross = 64;  ///< a surface then fills 64 pages
+    double blockEdge(std::int32_t level) const {
+        return blockSize_ * static_cast<double>(std::int32_t{1} << level);
+    }
+
     double blockSize_;
+    float levelScale_;               ///< levelOf()
+    std::int32_t levels_ = 0;        ///< in use: above the highest
     std::vector<PageChunk> chunks_;  ///< kPagesPerChunk pages each
     std::uint32_t pageCount_ = 0;
     std::vector<PageBounds> bounds_;        ///< of pages
     std::vector<std::uint32_t> freePages_;  ///< a heap, smallest on top: as after loading
     std::vector<Block> blocks_;
-    std::unordered_map<std::array<std::int32_t, 3>, std::uint32_t, KeyHash> blockOfKey_;
-    std::vector<EdgeChunk> edgeChunks_;
+    std::unordered_map<BlockKey, std::uint32_t, KeyHash> blockOfKey_;
+    /// In pieces: a vector that grows would hold up to twice of what it needs.
+    static constexpr std::uint32_t kEdgeChunksPerPiece = 1024;
+    using EdgePiece = std::array<EdgeChunk, kEdgeChunksPerPiece>;
+    EdgeChunk& edgeChunk(std::uint32_t i) {
+        return (*edgePieces_[i / kEdgeChunksPerPiece])[i % kEdgeChunksPerPiece];
+    }
+    const EdgeChunk& edgeChunk(std::uint32_t i) const {
+        return (*edgePieces_[i / kEdgeChunksPerPiece])[i % kEdgeChunksPerPiece];
+    }
+    std::vector<std::unique_ptr<EdgePiece>> edgePieces_;
+    std::uint32_t edgeChunkCount_ = 0;
     std::uint32_t freeEdgeChunk_ = EdgeChunk::kNone;
     double overhang_ = 0;  ///< how far vertices lie outside of their block's cube, at most [m]
     std::size_t vertexCount_ = 0, edgeCount_ = 0;
@@ -331,21 +360,28 @@ void GraphStorage::forEachBlockIn(const Eigen::Vector3f& min, const Eigen::Vecto
         }
     };
     const Eigen::Vector3f reach = Eigen::Vector3f::Constant(static_cast<float>(overhang_));
-    const auto low = keyOf(min - reach), high = keyOf(max + reach);
+    std::array<std::pair<BlockKey, BlockKey>, kLevels> cubes;
+    double keys = 0;
+    for (std::int32_t level = 0; level < levels_; ++level) {
+        const auto low = keyOf(min - reach, level), high = keyOf(max + reach, level);
+        cubes[static_cast<std::size_t>(level)] = {low, high};
+        keys += (1.0 + high[0] - low[0]) * (1.0 + high[1] - low[1]) * (1.0 + high[2] - low[2]);
+    }
     constexpr double kFewKeys = 64;
-    const double keys =
-        (1.0 + high[0] - low[0]) * (1.0 + high[1] - low[1]) * (1.0 + high[2] - low[2]);
     if (!(keys <= kFewKeys) || keys > static_cast<double>(blocks_.size())) {
         for (std::uint32_t b = 0; b < blocks_.size(); ++b) {
             visit(b);
         }
         return;
     }
-    for (std::int32_t x = low[0]; x <= high[0]; ++x) {
-        for (std::int32_t y = low[1]; y <= high[1]; ++y) {
-            for (std::int32_t z = low[2]; z <= high[2]; ++z) {
-                if (const std::uint32_t b = findBlock({x, y, z}); b != kNoBlock) {
-                    visit(b);
+    for (std::int32_t level = 0; level < levels_; ++level) {
+        const auto& [low, high] = cubes[static_cast<std::size_t>(level)];
+        for (std::int32_t x = low[0]; x <= high[0]; ++x) {
+            for (std::int32_t y = low[1]; y <= high[1]; ++y) {
+                for (std::int32_t z = low[2]; z <= high[2]; ++z) {
+                    if (const std::uint32_t b = findBlock({x, y, z, level}); b != kNoBlock) {
+                        visit(b);
+                    }
                 }
             }
         }

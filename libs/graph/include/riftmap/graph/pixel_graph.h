@@ -110,8 +110,13 @@ class PixelGraph {
     std::size_t vertexCount() const { return storage().vertexCount(); }
     std::size_t edgeCount() const { return storage().edgeCount(); }  ///< undirected
     std::size_t rawPointCount() const;  ///< valid pixels of all views so far
-    /// Everything allocated for the map: vertices, edges, hash, rifts, and the buffers of merge().
+    /// Everything allocated for the map: vertices, edges, hash, rifts.
     std::size_t memoryBytes() const;
+    /// Buffers that merge() keeps from view to view. They grow with what one view sees, not with
+    /// the map.
+    std::size_t bufferBytes() const;
+    /// Frees them; the next merge makes them anew. Copies of a graph come without.
+    void releaseBuffers();
     double surfaceArea() const;  ///< [m^2]; each patch once, however many views saw it
     void clear();
 
