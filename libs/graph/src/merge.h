@@ -10,11 +10,22 @@
 
 #include "association.h"
 #include "rift_finder.h"
+#include "riftmap/core/parallel.h"
 #include "riftmap/graph/graph_storage.h"
 #include "riftmap/graph/pixel_graph.h"
 #include "view_points.h"
 
 namespace riftmap {
+
+/// f(i) for each i of [0, n), `atOnce` in one go.
+template <class F>
+void forEach(std::size_t n, std::size_t atOnce, F&& f) {
+    parallelFor(n, atOnce, [&f](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i != end; ++i) {
+            f(i);
+        }
+    });
+}
 
 /// Merges views; keeps its buffers from one to the next.
 class Merger {
