@@ -118,6 +118,48 @@ void growSigma(const float* d, const float* up, const float* down, std::size_t w
     }
 }
 
+std::int32_t roughness(const std::uint8_t* first, std::size_t stride) {
+    const hn::CappedTag<std::int16_t, kNoiseBlock> i16;
+    const hn::Rebind<std::uint8_t, decltype(i16)> u8;
+    const std::size_t n = hn::Lanes(i16);
+    std::int32_t total = 0;
+    for (std::size_t x = 0; x < kNoiseBlock; x += n) {
+        auto sum = hn::Zero(i16);  // eight answers of 2040 at most fit
+        auto lowest = hn::Set(i16, 255), highest = hn::Zero(i16);
+        const auto load = [&](const std::uint8_t* at) {
+            return hn::PromoteTo(i16, hn::LoadU(u8, at));
+        };
+        const auto across = [&](std::size_t row) {
+            const std::uint8_t* at = first + x + row * stride - stride;
+            const auto middle = load(at);
+            if (row > 0 && row <= kNoiseBlock) {
+                lowest = hn::Min(lowest, middle);
+                highest = hn::Max(highest, middle);
+            }
+            return hn::Sub(hn::Add(load(at - 1), load(at + 1)), hn::Add(middle, middle));
+        };
+        auto above = across(0);
+        auto here = across(1);
+        for (std::size_t row = 2; row < kNoiseBlock + 2; ++row) {
+            const auto below = across(row);
+            sum = hn::Add(sum, hn::Abs(hn::Sub(hn::Add(above, below), hn::Add(here, here))));
+            above = here;
+            here = below;
+        }
+        const auto outside =
+            hn::Or(hn::Lt(lowest, hn::Set(i16, 8)), hn::Gt(highest, hn::Set(i16, 247)));
+        if (!hn::AllFalse(i16, outside)) {
+            return -1;
+        }
+        std::int16_t lanes[kNoiseBlock];
+        hn::StoreU(sum, i16, lanes);
+        for (std::size_t i = 0; i < n; ++i) {
+            total += lanes[i];
+        }
+    }
+    return total;
+}
+
 }  // namespace HWY_NAMESPACE
 }  // namespace riftmap::kernel
 HWY_AFTER_NAMESPACE();
@@ -129,6 +171,7 @@ HWY_EXPORT(findEnds);
 HWY_EXPORT(leastAlong);
 HWY_EXPORT(discardAbove);
 HWY_EXPORT(growSigma);
+HWY_EXPORT(roughness);
 
 std::size_t findEnds(const float* d, std::size_t width, float maxDifference, std::int32_t* ends) {
     return HWY_DYNAMIC_DISPATCH(findEnds)(d, width, maxDifference, ends);
@@ -146,6 +189,10 @@ void discardAbove(const float* const* rows, std::size_t count, std::size_t width
 void growSigma(const float* d, const float* up, const float* down, std::size_t width, float slope,
                float* sigma) {
     HWY_DYNAMIC_DISPATCH(growSigma)(d, up, down, width, slope, sigma);
+}
+
+std::int32_t roughness(const std::uint8_t* first, std::size_t stride) {
+    return HWY_DYNAMIC_DISPATCH(roughness)(first, stride);
 }
 
 }  // namespace riftmap::kernel

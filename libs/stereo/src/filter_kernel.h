@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Inner loops over the rows of a disparity image, chosen at run time for the machine's instruction
-// set; the same bytes with each of them. Infinity: no match.
+// Inner loops over the rows of an image or its disparity, chosen at run time for the machine's
+// instruction set; the same bytes with each of them. Infinity: no match.
 #pragma once
 
 #include <cstddef>
@@ -28,5 +28,13 @@ inline constexpr std::size_t kSlopeReach = 3;
 /// kSlopeReach pixels that are matched. `up`, `down`: the rows so far from the row `d`.
 void growSigma(const float* d, const float* up, const float* down, std::size_t width, float slope,
                float* sigma);
+
+/// Side of the blocks of roughness() [px].
+inline constexpr int kNoiseBlock = 8;
+
+/// Sum of absolute answers to the mask [1 -2 1; -2 4 -2; 1 -2 1] over a block whose first pixel is
+/// `first` (it has neighbours on all sides; `stride` in bytes); -1 where a pixel of the block lies
+/// outside 8 .. 247.
+std::int32_t roughness(const std::uint8_t* first, std::size_t stride);
 
 }  // namespace riftmap::kernel

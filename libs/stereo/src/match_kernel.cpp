@@ -380,9 +380,14 @@ void finishRow(const MatchJob& job, const Strip& s, const Minima& m, int row) {
             const auto slope = hn::ConvertTo(df, hn::Sub(before, after));
             d = hn::Add(d, hn::Div(hn::Mul(slope, f32(0.5F)), sharp));
         }
-        const auto variance = hn::Add(
-            f32(job.sigmaFloor * job.sigmaFloor),
-            hn::Div(hn::Mul(hn::ConvertTo(df, best), f32(job.sigmaShape * job.sigmaShape)), sharp));
+        const auto cost = hn::ConvertTo(df, best);
+        const auto& model = job.sigmaModel;
+        const auto excess =
+            hn::Max(f32(0), hn::Sub(hn::Mul(cost, cost), f32(model.explained * model.explained)));
+        const auto spread = hn::Add(f32(model.noise * model.noise),
+                                    hn::Mul(f32(model.mismatch * model.mismatch), excess));
+        const auto variance =
+            hn::Add(f32(model.floor * model.floor), hn::Div(spread, hn::Mul(sharp, sharp)));
         const auto valid = hn::RebindMask(df, ok);
         hn::Store(hn::IfThenElse(valid, d, f32(std::numeric_limits<float>::infinity())), df,
                   disparity);

@@ -44,8 +44,14 @@ struct MatchJob {
     int uniquenessRatio;     ///< rival costs up to best * (1 + this / 65536) + uniquenessMargin ...
     int uniquenessMargin;    ///< ... make a match ambiguous; negative margin: no check
     int minCurvature;        ///< least second difference of the cost at the minimum
-    float sigmaFloor;        ///< sigma^2 = floor^2 + shape^2 best / curvature [px]
-    float sigmaShape;
+
+    /// sigma^2 = floor^2 + (noise^2 + mismatch^2 max(0, best^2 - explained^2)) / curvature^2 [px^2]
+    struct Sigma {
+        float floor;      ///< [px]
+        float noise;      ///< of the cost's slope [cost]
+        float mismatch;   ///< factor
+        float explained;  ///< by noise, of the least cost [cost]
+    } sigmaModel;
 
     float* disparity;  ///< [px], infinity = none; `width` a row
     float* sigma;      ///< [px]; `width` a row

@@ -8,6 +8,7 @@
 
 #include "riftmap/stereo/disparity_filters.h"
 #include "riftmap/stereo/grey.h"
+#include "riftmap/stereo/image_noise.h"
 
 namespace riftmap {
 namespace {
@@ -22,8 +23,9 @@ void fillSigma(const cv::Mat& grey, const StereoOptions& options, int window, Di
     cv::Mat gradient, energy;
     cv::Sobel(grey, gradient, CV_32F, 1, 0, 1, 0.5);
     cv::boxFilter(gradient.mul(gradient), energy, CV_32F, {window, window}, {-1, -1}, false);
-    const double floor = std::max(options.sigmaFloor, 0.16);  // fitted to Motorcycle's truth
-    const double noise = 2 * options.imageNoise * options.imageNoise;
+    const double floor = std::max(options.sigmaFloor, 0.2);  // fitted to Motorcycle's truth
+    const double sample = options.imageNoise > 0 ? options.imageNoise : NoiseMeter().measure(grey);
+    const double noise = 2 * sample * sample;
     for (int r = 0; r < out.height; ++r) {
         for (int c = 0; c < out.width; ++c) {
             if (out.valid(c, r)) {

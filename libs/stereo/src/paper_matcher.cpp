@@ -17,6 +17,7 @@
 #include "match_kernel.h"
 #include "riftmap/stereo/disparity_filters.h"
 #include "riftmap/stereo/grey.h"
+#include "riftmap/stereo/image_noise.h"
 
 namespace riftmap {
 namespace {
@@ -64,9 +65,10 @@ class AlignedBuffer {
 /// Matches a grey pair with everything that works pixel by pixel; keeps its buffers.
 class Level {
  public:
-    /// `firstColumn`: the first column of `out` that is matched.
+    /// `noise`: of the images [grey levels]; `firstColumn`: the first column of `out` that is
+    /// matched.
     void match(const StereoOptions& options, const cv::Mat& left, const cv::Mat& right,
-               int firstColumn, DisparityImage& out);
+               double noise, int firstColumn, DisparityImage& out);
 
  private:
     static constexpr int kStripsPerThread = 3;
@@ -75,7 +77,36 @@ class Level {
     std::vector<AlignedBuffer<std::uint16_t>> scratch_;  ///< one a thread
 };
 
-kernel::MatchJob jobOf(const StereoOptions& options, int width, int height) {
+/// Standard deviation that the prefilter makes of noise of 1 grey level: the root of the sum of its
+/// squared weights.
+double noiseGain(const StereoOptions& options) {
+    switch (options.prefilter) {
+        case Prefilter::kDog:
+            return 0.2799 * options.prefilterGain;
+        case Prefilter::kGradient:
+            return 3.4641 * options.prefilterGain;
+        case Prefilter::kNone:
+            break;
+    }
+    return 1;
+}
+
+/// sigma from the minimum's shape for image noise of `noise` grey levels; a cost sums up `pixels`.
+kernel::MatchJob::Sigma sigmaModelOf(const StereoOptions& options, double noise, int pixels) {
+    constexpr double kMeanDifference = 1.12838;  // mean |a - b| of two samples, noise 1
+    constexpr double kSure = 1.75;  // costs vary: noise alone hardly ever makes more of its mean
+    constexpr double kWholePixel = 0.288675;       // rounding
+    const int times = options.semiGlobal ? 2 : 1;  // that the passes add up a pixel's cost
+    const double filtered = noise * noiseGain(options) * times;
+    const double floor =
+        options.subpixel ? options.sigmaFloor : std::hypot(options.sigmaFloor, kWholePixel);
+    return {.floor = static_cast<float>(floor),
+            .noise = static_cast<float>(options.sigmaNoise * filtered * std::sqrt(pixels)),
+            .mismatch = static_cast<float>(options.sigmaMismatch),
+            .explained = static_cast<float>(kSure * kMeanDifference * filtered * pixels)};
+}
+
+kernel::MatchJob jobOf(const StereoOptions& options, double noise, int width, int height) {
     const auto [half, offset] = layoutOf(options);
     const int range = options.numDisparities;
     const int windows = offset > 0 ? 3 : 1;
@@ -105,17 +136,16 @@ kernel::MatchJob jobOf(const StereoOptions& options, int width, int height) {
             .uniquenessRatio = options.uniqueness * 65536 / 100,
             .uniquenessMargin = options.uniqueness > 0 ? ofPixels(options.uniquenessMargin) : -1,
             .minCurvature = ofPixels(options.sharpness),
-            .sigmaFloor = static_cast<float>(options.sigmaFloor),
-            .sigmaShape = static_cast<float>(options.sigmaShape),
+            .sigmaModel = sigmaModelOf(options, noise, pixels),
             .disparity = nullptr,
             .sigma = nullptr};
 }
 
 void Level::match(const StereoOptions& options, const cv::Mat& left, const cv::Mat& right,
-                  int firstColumn, DisparityImage& out) {
+                  double noise, int firstColumn, DisparityImage& out) {
     const int width = left.cols;
     const int height = left.rows;
-    kernel::MatchJob job = jobOf(options, width, height);
+    kernel::MatchJob job = jobOf(options, noise, width, height);
     const auto w = static_cast<std::size_t>(width);
     const auto h = static_cast<std::size_t>(height);
     const std::size_t stride = w + static_cast<std::size_t>(job.paddedDisparities);
@@ -216,7 +246,7 @@ class NearGuard {
         }
         shrink(pair.left, sums_, left_);
         shrink(pair.right, sums_, right_);
-        level_.match(coarse, left_, right_, 0, found_);
+        level_.match(coarse, left_, right_, 0, 0, found_);
         // A wrong match here would cost true ones there: it must not stand alone.
         isolated_.apply(found_, kLeastSurface, 1.0F);
     }
@@ -259,6 +289,7 @@ struct PaperMatcher::Buffers {
     Level level;
     NearGuard guard;
     IsolatedFilter isolated;
+    NoiseMeter noise;
     RimFilter rim;
     std::vector<float> scratch;
 };
@@ -280,8 +311,10 @@ void PaperMatcher::compute(const cv::Mat& left, const cv::Mat& right, DisparityI
     out.minDisparity = static_cast<float>(options_.minDisparity);
     out.maxDisparity = static_cast<float>(maxDisparity);
     out.firstColumn = std::clamp(maxDisparity, 0, b.grey.left.cols);
+    const double noise =
+        options_.imageNoise > 0 ? options_.imageNoise : b.noise.measure(b.grey.left);
     tbb::parallel_invoke(
-        [&] { b.level.match(options_, b.grey.left, b.grey.right, out.firstColumn, out); },
+        [&] { b.level.match(options_, b.grey.left, b.grey.right, noise, out.firstColumn, out); },
         [&] { b.guard.search(options_, b.grey); });
     b.guard.discard(out);
     b.isolated.apply(out, options_.isolatedSize, static_cast<float>(options_.isolatedDifference));

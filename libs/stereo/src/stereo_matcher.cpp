@@ -77,14 +77,18 @@ void StereoOptions::describe(OptionTable& table) {
               "Disparity by which a farther surface is lower, at least.");
     table.add("sigma_floor", sigmaFloor, 0.001, 10.0, "px",
               "Least standard deviation of a matched disparity.");
+    table.add("sigma_noise", sigmaNoise, 0.0, 100.0, "",
+              "Growth of the standard deviation with the images' noise, as the window sums it up, "
+              "over the curvature of the minimum.");
     table.add(
-        "sigma_shape", sigmaShape, 0.0, 10.0, "px",
-        "Growth of the standard deviation with the root of cost over curvature at the minimum.");
+        "sigma_mismatch", sigmaMismatch, 0.0, 10.0, "",
+        "Growth of the standard deviation with the part of the least cost that noise does not "
+        "explain, over the curvature.");
     table.add("sigma_slope", sigmaSlope, 0.0, 10.0, "",
               "Growth of the standard deviation with the change of disparity a pixel: windows mix "
               "what they see.");
     table.add("image_noise", imageNoise, 0.0, 64.0, "grey levels",
-              "Standard deviation of an image sample, for the sigma of OpenCV's matchers.");
+              "Standard deviation of an image sample; 0: measured in every left image.");
     table.add("sigma_d", sigmaGiven, 0.001, 10.0, "px",
               "Standard deviation of a given disparity that comes without one.");
 }

@@ -48,12 +48,14 @@ Sample randomSample(std::mt19937_64& random) {
     const int width = upTo(0, 3) == 0 ? upTo(1, 12) : upTo(13, 110);
     const int height = upTo(0, 3) == 0 ? upTo(1, 6) : upTo(7, 40);
     const int levels = coin() ? 255 : upTo(1, 8);
+    const int darkest = coin() ? 0 : 20;  // noise is measured away from black and white
+    const int brightest = darkest > 0 ? 230 : 255;
     s.left.create(height, width, CV_8UC1);
     s.right.create(height, width, CV_8UC1);
     for (int y = 0; y < height; ++y) {
         for (int x = 0; x < width; ++x) {
-            s.left.at<std::uint8_t>(y, x) =
-                static_cast<std::uint8_t>(upTo(0, levels) * 255 / levels);
+            s.left.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(
+                darkest + upTo(0, levels) * (brightest - darkest) / levels);
         }
     }
     const int shift = upTo(0, 40);
@@ -92,6 +94,9 @@ Sample randomSample(std::mt19937_64& random) {
     o.rimTexture = coin() ? 0 : upTo(1, 160);
     o.silhouetteReach = upTo(0, 4);
     o.silhouetteRows = upTo(0, 5);
+    o.imageNoise = coin() ? 0 : upTo(1, 40) * 0.25;
+    o.sigmaNoise = upTo(0, 8) * 0.5;
+    o.sigmaMismatch = upTo(0, 8) * 0.1;
     o.sigmaSlope = coin() ? 0 : upTo(1, 8) * 0.2;
     o.silhouetteStep = upTo(2, 8) * 0.5;
     OptionTable table;

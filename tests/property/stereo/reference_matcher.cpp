@@ -243,7 +243,56 @@ bool hasAnchor(Volume& own, Volume& cost, int x, int y, int firstColumn, const S
     return false;
 }
 
-void matchPixel(Volume& cost, int x, int y, const StereoOptions& o, DisparityImage& out) {
+/// Immerkaer's estimate of the noise, block by block; see NoiseMeter.
+double noiseOf(const Image& image) {
+    std::vector<long> blocks;
+    for (int y = 1; y + 8 < image.height; y += 8) {
+        for (int x = 1; x + 8 < image.width; x += 8) {
+            if ((x / 8 + y / 8) % 2 != 0) {
+                continue;
+            }
+            long sum = 0;
+            bool cut = false;
+            for (int v = y; v < y + 8; ++v) {
+                for (int u = x; u < x + 8; ++u) {
+                    sum += std::abs(filtered(image, u, v, {1, -2, 1}, {1, -2, 1}));
+                    cut = cut || image.at(u, v) < 8 || image.at(u, v) > 247;
+                }
+            }
+            if (!cut) {
+                blocks.push_back(sum);
+            }
+        }
+    }
+    std::sort(blocks.begin(), blocks.end());
+    const double rounding = 1 / std::sqrt(12.0);
+    return blocks.empty() ? rounding
+                          : std::max(rounding, static_cast<double>(blocks[blocks.size() / 10]) /
+                                                   (64 * (6 * 0.79788456)));
+}
+
+/// Standard deviation of a match from its minimum, without slope.
+float sigmaOf(long least, long curvature, double noise, const StereoOptions& o) {
+    double gain = 1;
+    if (o.prefilter != Prefilter::kNone) {
+        gain = (o.prefilter == Prefilter::kDog ? 0.2799 : 3.4641) * o.prefilterGain;
+    }
+    const double filtered = noise * gain * (o.semiGlobal ? 2 : 1);
+    const int pixels = layoutOf(o).pixels;
+    const auto floor =
+        static_cast<float>(o.subpixel ? o.sigmaFloor : std::hypot(o.sigmaFloor, 0.288675));
+    const auto random = static_cast<float>(o.sigmaNoise * filtered * std::sqrt(pixels));
+    const auto explained = static_cast<float>(1.75 * 1.12838 * filtered * pixels);
+    const auto mismatch = static_cast<float>(o.sigmaMismatch);
+    const auto cost = static_cast<float>(least);
+    const auto sharp = static_cast<float>(std::max(1L, curvature));
+    const float excess = std::max(0.0F, cost * cost - explained * explained);
+    return std::sqrt(floor * floor +
+                     (random * random + mismatch * mismatch * excess) / (sharp * sharp));
+}
+
+void matchPixel(Volume& cost, int x, int y, double noise, const StereoOptions& o,
+                DisparityImage& out) {
     const int best = bestOfLeft(cost, x, y);
     if (best == 0 || best == cost.depth - 1 ||
         (o.uniqueness > 0 && hasRival(cost, x, y, best, o.uniqueness, o.uniquenessMargin, o))) {
@@ -270,14 +319,11 @@ void matchPixel(Volume& cost, int x, int y, const StereoOptions& o, DisparityIma
     if (o.subpixel) {
         d += static_cast<float>(before - after) * 0.5F / sharp;
     }
-    const auto floor = static_cast<float>(o.sigmaFloor);
-    const auto shape = static_cast<float>(o.sigmaShape);
     out.disparity[out.index(x, y)] = d;
-    out.sigma[out.index(x, y)] =
-        std::sqrt(floor * floor + static_cast<float>(least) * (shape * shape) / sharp);
+    out.sigma[out.index(x, y)] = sigmaOf(least, curvature, noise, o);
 }
 
-DisparityImage level(const Image& left, const Image& right, const StereoOptions& o,
+DisparityImage level(const Image& left, const Image& right, double noise, const StereoOptions& o,
                      int firstColumn) {
     Volume own = windowCosts(prefiltered(left, o), prefiltered(right, o), o);
     Volume cost = o.semiGlobal ? semiGlobal(own, o) : own;
@@ -286,7 +332,7 @@ DisparityImage level(const Image& left, const Image& right, const StereoOptions&
     for (int y = 0; y < left.height; ++y) {
         for (int x = firstColumn; x < left.width; ++x) {
             if (!o.semiGlobal || hasAnchor(own, cost, x, y, firstColumn, o)) {
-                matchPixel(cost, x, y, o, out);
+                matchPixel(cost, x, y, noise, o, out);
             }
         }
     }
@@ -349,7 +395,7 @@ void guard(const Image& left, const Image& right, const StereoOptions& o, Dispar
     coarse.window = std::min(7, o.window);
     coarse.semiGlobal = false;
     coarse.subpixel = true;
-    DisparityImage found = level(shrunk(left), shrunk(right), coarse, 0);
+    DisparityImage found = level(shrunk(left), shrunk(right), 0, coarse, 0);
     removeIsolated(found, 12, 1.0F);
     const auto tooNear = [&](int x, int y) {
         return x >= 0 && y >= 0 && x < found.width && y < found.height && found.valid(x, y) &&
@@ -469,7 +515,8 @@ void discardSilhouettes(DisparityImage& image, const StereoOptions& o) {
 DisparityImage match(const cv::Mat& left, const cv::Mat& right, const StereoOptions& o) {
     const Image l = fromMat(left), r = fromMat(right);
     const int last = o.minDisparity + o.numDisparities - 1;
-    DisparityImage out = level(l, r, o, std::clamp(last, 0, l.width));
+    const double noise = o.imageNoise > 0 ? o.imageNoise : noiseOf(l);
+    DisparityImage out = level(l, r, noise, o, std::clamp(last, 0, l.width));
     out.firstColumn = std::clamp(last, 0, l.width);
     guard(l, r, o, out);
     removeIsolated(out, o.isolatedSize, static_cast<float>(o.isolatedDifference));

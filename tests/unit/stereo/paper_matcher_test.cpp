@@ -230,7 +230,7 @@ TEST(PaperMatcher, SubpixelOfASlantedPlane) {
                 const double e = static_cast<double>(d.at(x, y) - disparity(x));
                 sum += e * e;
                 ++n;
-                EXPECT_GE(d.sigma[d.index(x, y)], 0.10F);
+                EXPECT_GE(d.sigma[d.index(x, y)], static_cast<float>(StereoOptions().sigmaFloor));
             }
         }
     }

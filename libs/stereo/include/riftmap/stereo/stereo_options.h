@@ -52,11 +52,12 @@ struct StereoOptions {
     int silhouetteRows = 4;         ///< the same up and down [rows]
     double silhouetteStep = 4;      ///< what counts as farther: lower disparity by more [px]
 
-    double sigmaFloor = 0.10;  ///< least standard deviation of a disparity [px]
-    double sigmaShape = 0.20;  ///< its growth with cost over curvature at the minimum [px]
-    double sigmaSlope = 0.6;   ///< its growth with the change of disparity from pixel to pixel
-    double imageNoise = 2;     ///< standard deviation of a sample, for OpenCV's [grey levels]
-    double sigmaGiven = 0.1;   ///< standard deviation of a given disparity [px]
+    double sigmaFloor = 0.08;     ///< least standard deviation of a disparity [px]
+    double sigmaNoise = 3.5;      ///< its growth with the images' noise over the curvature
+    double sigmaMismatch = 0.43;  ///< its growth with what else is left of the cost
+    double sigmaSlope = 0.3;      ///< its growth with the change of disparity from pixel to pixel
+    double imageNoise = 0;        ///< standard deviation of a sample; 0: measured [grey levels]
+    double sigmaGiven = 0.1;      ///< standard deviation of a given disparity [px]
 
     /// Adds section [Stereo] to the table.
     void describe(OptionTable& table);
