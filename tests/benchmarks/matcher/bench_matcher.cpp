@@ -48,6 +48,9 @@ void setSemiGlobal(StereoOptions& o) {
     o.truncation = 62;
     o.window = 7;
     o.sigmaFloor = 0.13;
+    o.anchorReach = 48;
+    o.leftRightTolerance = 1;
+    o.isolatedSize = 200;
 }
 
 /// The settings of the table: those of the library, but for what is said here. OpenCV's matchers
@@ -95,6 +98,7 @@ std::vector<Contender> contenders(const std::vector<std::string>& settings) {
                  o.silhouetteReach = 0;
                  o.uniqueness = 0;
                  o.isolatedSize = 50;
+                 o.leftRightTolerance = 2;
              })},
             {"paper_one_window", paper([](StereoOptions& o) {
                  o.supportingWindows = false;

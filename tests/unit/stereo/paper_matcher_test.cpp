@@ -40,6 +40,9 @@ class PaperMatcherOn : public ::testing::TestWithParam<Settings> {
             o.prefilterCap = 31;
             o.truncation = 62;
             o.window = 7;
+            o.anchorReach = 48;
+            o.leftRightTolerance = 1;
+            o.isolatedSize = 200;
         }
         return o;
     }
