@@ -25,7 +25,8 @@ void fillSigma(const cv::Mat& grey, const StereoOptions& options, int window, Di
     cv::boxFilter(gradient.mul(gradient), energy, CV_32F, {window, window}, {-1, -1}, false);
     const double floor = std::max(options.sigmaFloor, 0.2);  // fitted to Motorcycle's truth
     const double sample = options.imageNoise > 0 ? options.imageNoise : NoiseMeter().measure(grey);
-    const double noise = 2 * sample * sample;
+    constexpr double kShort = 2;  // of the bound that matchers stay, fitted likewise
+    const double noise = 2 * (kShort * sample) * (kShort * sample);
     for (int r = 0; r < out.height; ++r) {
         for (int c = 0; c < out.width; ++c) {
             if (out.valid(c, r)) {
