@@ -17,6 +17,7 @@ namespace riftmap {
 namespace {
 
 constexpr float kNoiseFactor = 3.0F;       // standard deviations
+constexpr float kSameSide = 0.7F;          // cosine of 45 degrees
 constexpr unsigned kDeletingEvidence = 2;  // views
 constexpr std::uint32_t kPagesAtOnce = 16;
 constexpr int kTile = 8;
@@ -148,12 +149,24 @@ void Merger::update(Page& page, std::uint32_t slot, std::uint32_t candidate, flo
     page.open[slot] = open;
     // The pixels of a vertex are its share of the surface, where none of them is cut off.
     if (frontal(pixel) && (claims.flags & Association::kSomeSurrounded) != 0 &&
-        (claims.flags & Association::kSomeOpen) == 0) {
+        (claims.flags & Association::kSomeOpen) == 0 && sameSide(page.normal[slot], pixel)) {
         const float area = static_cast<float>(claims.area) * Association::kAreaUnit;
         const std::uint16_t code = compact::Area::encode(area);
         work.area += compact::areaUnits(code) - compact::areaUnits(page.area[slot]);
         page.area[slot] = code;
     }
+}
+
+/// True unless vertex and pixel lie on two sides of an edge: the surface that the pixel shows is
+/// not the vertex' own then, however near it lies.
+bool Merger::sameSide(std::uint32_t normal, std::size_t pixel) const {
+    const auto w = static_cast<std::size_t>(points_.width);
+    const auto column = static_cast<int>(pixel % w), row = static_cast<int>(pixel / w);
+    if (normal == 0 || !points_.onPatch(column, row)) {
+        return true;
+    }
+    const Eigen::Vector3f seen = points_.rotation * points_.patch(column, row).normal;
+    return compact::decodeDirection(normal).dot(seen) >= kSameSide;
 }
 
 bool Merger::lookedThrough(const Candidate& candidate) const {
@@ -214,7 +227,8 @@ void Merger::passOver(Page& page, std::uint32_t slot, std::uint32_t candidate, P
         page.state[slot] | (points_.kinds[i] == 0 ? kSurrounded : 0) |
         (points_.spacing(i) <= static_cast<float>(options_.targetResolution) ? kFineEnough : 0));
     fuseAlongRay(page, slot, seen, depth, points_.sigma[i], work);
-    if (frontal(i) && points_.kinds[i] == 0 && page.area[slot] != 0) {
+    if (page.area[slot] != 0 && frontal(i) && points_.kinds[i] == 0 &&
+        sameSide(page.normal[slot], i)) {
         // The pixels around stand for this vertex' share of the surface already.
         work.area -= compact::areaUnits(page.area[slot]);
         page.area[slot] = 0;

@@ -86,6 +86,7 @@ class Merger {
     void passOver(Page& page, std::uint32_t slot, std::uint32_t candidate, PageWork& work);
     void fuseAlongRay(Page& page, std::uint32_t slot, const Candidate& seen, float depth,
                       float pixelSigma, PageWork& work);
+    bool sameSide(std::uint32_t normal, std::size_t pixel) const;
     bool lookedThrough(const Candidate& candidate) const;
     void deleteSeenThrough(GraphStorage& storage, RiftFinder& rifts, MergeResult& result);
     void grow(GraphStorage& storage, MergeResult& result);
