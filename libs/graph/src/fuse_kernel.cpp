@@ -182,7 +182,7 @@ HWY_INLINE void move(float* at, V step, M there) {
 
 void fuseOf(const ViewPoints& view, Page& page, PageFusion& fusion) {
     const auto lanes = static_cast<std::uint32_t>(hn::Lanes(d));
-    fusion.moved = 0;
+    fusion.moved = fusion.roundEdge = 0;
     for (std::uint32_t slot = 0; slot < Page::kSize; slot += lanes) {
         const M there = slotMask(fusion.matched, slot);
         if (hn::AllFalse(d, there)) {
@@ -225,13 +225,18 @@ void fuseOf(const ViewPoints& view, Page& page, PageFusion& fusion) {
         const M onPatch = fuser.patchNormal(seen);
         const VU old = hn::LoadU(du, page.normal.data() + slot);
         const Directions known = decodeDirections(old);
+        const M renew = hn::And(there, hn::And(noisy, onPatch));
+        const V cosine = hn::Add(hn::Mul(known.x, seen.x),
+                                 hn::Add(hn::Mul(known.y, seen.y), hn::Mul(known.z, seen.z)));
+        const M apart =
+            hn::And(hn::RebindMask(d, hn::Ne(old, hn::Zero(du))), hn::Lt(cosine, set(kSameSide)));
+        fusion.roundEdge |= slotBits(hn::And(renew, apart), slot);
         const V rest = hn::Sub(set(1.0F), gain);
         const auto mixed = [&](V was, V is) {
             return hn::Add(hn::Mul(rest, was), hn::Mul(gain, is));
         };
         const VU normal = encodeDirections(
             {mixed(known.x, seen.x), mixed(known.y, seen.y), mixed(known.z, seen.z)});
-        const M renew = hn::And(there, hn::And(noisy, onPatch));
         hn::StoreU(hn::IfThenElse(hn::RebindMask(du, renew), normal, old), du,
                    page.normal.data() + slot);
     }

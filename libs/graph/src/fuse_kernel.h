@@ -13,6 +13,7 @@ namespace riftmap {
 
 inline constexpr float kTinySigma = 1e-6F;   ///< [m]
 inline constexpr float kLeastSigma = 1e-4F;  ///< [m] nothing is known better by one view
+inline constexpr float kSameSide = 0.7F;     ///< cosine of 45 degrees
 inline constexpr float kNoisy = 0.25F;       ///< sigma per spacing above which normals are patches'
 
 /// The matched vertices of a page.
@@ -22,6 +23,9 @@ struct PageFusion {
     const float* before = nullptr;                   ///< sigma of the slots until now [m]
     std::array<float, Page::kSize> sigma{}, gain{};  ///< result: sigma now, weight of the pixel
     std::uint64_t moved = 0;                         ///< result: slots to fit a normal to again
+    /// Result: slots whose normal until now lies more than 45 degrees off that of the pixel, where
+    /// noise makes the gate wide: the pixel shows the surface round an edge.
+    std::uint64_t roundEdge = 0;
 };
 
 /// Inverse-variance fusion of position and normal along and across the ray; writes the positions,

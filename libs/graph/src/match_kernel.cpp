@@ -40,16 +40,15 @@ class Search {
         who_ = hn::Set(di_, -1);
     }
 
+    /// Squares of growing size: a square's row of pixels is one run of entries, so the pixels
+    /// looked at again cost less than a ring's many pieces.
     HWY_INLINE void run() {
-        for (int r = in_.row - 1; r <= in_.row + 1; ++r) {
-            look(r, column_ - 1, column_ + 1);
-        }
-        for (int ring = 2; ring <= radius_ && !enough(ring); ++ring) {
-            look(in_.row - ring, column_ - ring, column_ + ring);
-            look(in_.row + ring, column_ - ring, column_ + ring);
-            for (int r = in_.row - ring + 1; r < in_.row + ring; ++r) {
-                look(r, column_ - ring, column_ - ring);
-                look(r, column_ + ring, column_ + ring);
+        for (int half = 1;; half = half * 3 < radius_ ? half * 3 : radius_) {
+            for (int r = in_.row - half; r <= in_.row + half; ++r) {
+                look(r, column_ - half, column_ + half);
+            }
+            if (half >= radius_ || enough(half + 1)) {
+                return;
             }
         }
     }
@@ -65,9 +64,9 @@ class Search {
     }
 
  private:
-    /// Nothing `ring` pixels away or farther can be nearer than what was found.
-    HWY_INLINE bool enough(int ring) const {
-        const float nearest = static_cast<float>(ring) - 0.5F;
+    /// Nothing `pixels` away or farther can be nearer than what was found.
+    HWY_INLINE bool enough(int pixels) const {
+        const float nearest = static_cast<float>(pixels) - 0.5F;
         const float least = hn::GetLane(hn::MinOfLanes(d_, best_));
         return nearest * nearest * lateralScale_ > least;
     }

@@ -17,7 +17,6 @@ namespace riftmap {
 namespace {
 
 constexpr float kNoiseFactor = 3.0F;       // standard deviations
-constexpr float kSameSide = 0.7F;          // cosine of 45 degrees
 constexpr unsigned kDeletingEvidence = 2;  // views
 constexpr std::uint32_t kPagesAtOnce = 16;
 constexpr int kTile = 8;
@@ -73,14 +72,6 @@ MergeResult Merger::merge(const View& view, GraphStorage& storage, RiftFinder& r
     return result;
 }
 
-std::array<std::uint8_t, 3> Merger::colourAt(std::size_t pixel) const {
-    const std::uint8_t* at = image_.data + channels_ * pixel;
-    if (channels_ == 0) {
-        return {128, 128, 128};
-    }
-    return channels_ == 1 ? std::array{at[0], at[0], at[0]} : std::array{at[2], at[1], at[0]};
-}
-
 /// Asks for the page in view that comes next: pages lie anywhere, so the processor cannot foresee.
 void Merger::prefetchPage(const GraphStorage& storage, std::uint32_t which) const {
     if (which < seen_.pages.size()) {
@@ -131,7 +122,7 @@ std::uint8_t Merger::openBits(std::uint8_t kinds, std::uint8_t state, float sigm
 /// What a view says of a matched vertex beside its place: its state, openness and share of the
 /// surface.
 void Merger::update(Page& page, std::uint32_t slot, std::uint32_t candidate, float sigma,
-                    PageWork& work) {
+                    bool roundEdge, PageWork& work) {
     const Association::Claims& claims = seen_.claims[candidate];
     const auto pixel = static_cast<std::uint32_t>(claims.best);
     std::uint8_t& state = page.state[slot];
@@ -149,7 +140,7 @@ void Merger::update(Page& page, std::uint32_t slot, std::uint32_t candidate, flo
     page.open[slot] = open;
     // The pixels of a vertex are its share of the surface, where none of them is cut off.
     if (frontal(pixel) && (claims.flags & Association::kSomeSurrounded) != 0 &&
-        (claims.flags & Association::kSomeOpen) == 0 && sameSide(page.normal[slot], pixel)) {
+        (claims.flags & Association::kSomeOpen) == 0 && !roundEdge) {
         const float area = static_cast<float>(claims.area) * Association::kAreaUnit;
         const std::uint16_t code = compact::Area::encode(area);
         work.area += compact::areaUnits(code) - compact::areaUnits(page.area[slot]);
@@ -160,8 +151,9 @@ void Merger::update(Page& page, std::uint32_t slot, std::uint32_t candidate, flo
 /// True unless vertex and pixel lie on two sides of an edge: the surface that the pixel shows is
 /// not the vertex' own then, however near it lies.
 bool Merger::sameSide(std::uint32_t normal, std::size_t pixel) const {
-    const auto w = static_cast<std::size_t>(points_.width);
-    const auto column = static_cast<int>(pixel % w), row = static_cast<int>(pixel / w);
+    const auto w = static_cast<std::uint32_t>(points_.width);
+    const auto i = static_cast<std::uint32_t>(pixel);
+    const int column = static_cast<int>(i % w), row = static_cast<int>(i / w);
     if (normal == 0 || !points_.onPatch(column, row)) {
         return true;
     }
@@ -268,7 +260,7 @@ void Merger::fusePage(GraphStorage& storage, std::uint32_t which) {
     });
     if (paper()) {  // the first position stays
         forEachBit(fusion.matched, [&](std::uint32_t slot) {
-            update(page, slot, first + slot, compact::Sigma::decode(page.sigma[slot]), work);
+            update(page, slot, first + slot, compact::Sigma::decode(page.sigma[slot]), false, work);
         });
         return;
     }
@@ -277,13 +269,14 @@ void Merger::fusePage(GraphStorage& storage, std::uint32_t which) {
     work.moved = fusion.moved;
     forEachBit(fusion.matched, [&](std::uint32_t slot) {
         const float gain = fusion.gain[slot];
-        const auto colour = colourAt(fusion.pixel[slot]);
+        const std::array<std::uint8_t, 3> colour = colourAt(fusion.pixel[slot]);
         for (std::size_t i = 0; i < 3; ++i) {
             const float before = page.rgb[slot][i];
             page.rgb[slot][i] = static_cast<std::uint8_t>(
                 compact::roundNearest(before + gain * (static_cast<float>(colour[i]) - before)));
         }
-        update(page, slot, first + slot, fusion.sigma[slot], work);
+        update(page, slot, first + slot, fusion.sigma[slot], ((fusion.roundEdge >> slot) & 1U) != 0,
+               work);
     });
     forEachBit(inView & ~fusion.matched,
                [&](std::uint32_t slot) { passOver(page, slot, first + slot, work); });

@@ -82,7 +82,7 @@ class Merger {
     void findSeenThroughEdges(const GraphStorage& storage, std::uint32_t which);
     void fusePage(GraphStorage& storage, std::uint32_t which);
     void update(Page& page, std::uint32_t slot, std::uint32_t candidate, float sigma,
-                PageWork& work);
+                bool roundEdge, PageWork& work);
     void passOver(Page& page, std::uint32_t slot, std::uint32_t candidate, PageWork& work);
     void fuseAlongRay(Page& page, std::uint32_t slot, const Candidate& seen, float depth,
                       float pixelSigma, PageWork& work);
@@ -105,7 +105,13 @@ class Merger {
     bool paper() const { return options_.fusion == GraphOptions::Fusion::kFirst; }
 
     /// Red, green, blue; grey where the view has no image.
-    std::array<std::uint8_t, 3> colourAt(std::size_t pixel) const;
+    std::array<std::uint8_t, 3> colourAt(std::size_t pixel) const {
+        const std::uint8_t* at = image_.data + channels_ * pixel;
+        if (channels_ == 0) {
+            return {128, 128, 128};
+        }
+        return channels_ == 1 ? std::array{at[0], at[0], at[0]} : std::array{at[2], at[1], at[0]};
+    }
 
     GraphOptions options_;
     MergeTimes times_;
