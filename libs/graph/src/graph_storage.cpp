@@ -39,7 +39,7 @@ GraphStorage::GraphStorage(const GraphStorage& other)
       vertexCount_(other.vertexCount_),
       edgeCount_(other.edgeCount_) {
     for (std::uint32_t first = 0; first < pageCount_; first += kPagesPerChunk) {
-        chunks_.push_back(newChunk());
+        chunks_.push_back(newChunk(first > 0));
         std::uninitialized_copy_n(&other.page(first), std::min(kPagesPerChunk, pageCount_ - first),
                                   chunks_.back().get());
     }
@@ -94,13 +94,34 @@ std::uint32_t GraphStorage::blockAt(const BlockKey& key) {
     return it->second;
 }
 
-GraphStorage::PageChunk GraphStorage::newChunk() const {
+GraphStorage::PageChunk GraphStorage::newChunk(bool large) {
     PageChunk chunk(static_cast<Page*>(std::aligned_alloc(kChunkBytes, kChunkBytes)));
     if (!chunk) {
         throw std::bad_alloc();
     }
-    if (!chunks_.empty()) {  // a small map does not need 2 MB at once
+    if (large) {
         ::madvise(chunk.get(), kChunkBytes, MADV_HUGEPAGE);  // no harm where it is not possible
+    }
+    return chunk;
+}
+
+/// The first touch of fresh memory costs more than filling it: up to 5 ms for a chunk where a
+/// virtual machine has to be given it first. So once a map has a few chunks, the next one is
+/// touched by another thread while the last one fills.
+GraphStorage::PageChunk GraphStorage::takeChunk() {
+    constexpr std::size_t kSmallMap = 4;
+    PageChunk chunk =
+        nextChunk_.valid() ? nextChunk_.get() : newChunk(!chunks_.empty());  // 2 MB are not little
+    if (chunks_.size() >= kSmallMap) {
+        nextChunk_ = std::async(std::launch::async | std::launch::deferred, [] {
+            PageChunk next = newChunk(true);
+            auto* bytes = reinterpret_cast<volatile char*>(next.get());
+            constexpr std::size_t kSystemPage = 4096;
+            for (std::size_t i = 0; i < kChunkBytes; i += kSystemPage) {
+                bytes[i] = 0;
+            }
+            return next;
+        });
     }
     return chunk;
 }
@@ -108,7 +129,7 @@ GraphStorage::PageChunk GraphStorage::newChunk() const {
 void GraphStorage::reservePages(std::uint32_t count) {
     while (pageCount_ < count) {
         if (pageCount_ % kPagesPerChunk == 0) {
-            chunks_.push_back(newChunk());
+            chunks_.push_back(takeChunk());
         }
         new (&page(pageCount_)) Page;
         ++pageCount_;
@@ -359,8 +380,9 @@ std::size_t GraphStorage::memoryBytes() const {
     std::size_t bytes =
         // the first chunk is resident as far as it is used
         (chunks_.size() <= 1 ? pageCount_ * sizeof(Page) : chunks_.size() * kChunkBytes) +
-        chunks_.capacity() * sizeof(chunks_[0]) + freePages_.capacity() * sizeof(std::uint32_t) +
-        blocks_.capacity() * sizeof(Block) + edgePieces_.size() * sizeof(EdgePiece) +
+        (nextChunk_.valid() ? kChunkBytes : 0) + chunks_.capacity() * sizeof(chunks_[0]) +
+        freePages_.capacity() * sizeof(std::uint32_t) + blocks_.capacity() * sizeof(Block) +
+        edgePieces_.size() * sizeof(EdgePiece) +
         // a node and a bucket an entry, as libstdc++ has them
         blockOfKey_.size() * (sizeof(*blockOfKey_.begin()) + 2 * sizeof(void*)) +
         blockOfKey_.bucket_count() * sizeof(void*);

@@ -65,16 +65,16 @@ class Merger {
             VertexId a, b;
             std::uint16_t code;
         };
-        std::vector<VertexId> a, b;
-        std::vector<std::uint32_t> code;
+        std::vector<VertexId> from, right, down;
+        std::vector<std::uint32_t> codes;
         std::vector<Lower> lower;      ///< edges that the map has with a larger weight
         std::vector<NewEdge> missing;  ///< those that it lacks
-        void resize(std::size_t n) {
-            a.resize(n);
-            b.resize(n);
-            code.resize(n);
-            lower.resize(n);
-            missing.resize(n);
+        void resize(std::size_t pixels) {
+            for (auto* values : {&from, &right, &down, &codes}) {
+                values->resize(pixels);
+            }
+            lower.resize(2 * pixels);
+            missing.resize(2 * pixels);
         }
     };
 

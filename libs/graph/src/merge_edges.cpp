@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The edges of a view become edges of the map.
 #include <algorithm>
-#include <atomic>
 #include <cstddef>
 #include <iterator>
 #include <utility>
@@ -21,10 +20,8 @@ constexpr int kRowsAtOnce = 8;
 
 void Merger::connectNew(GraphStorage& storage, MergeResult& result) {
     // Each new vertex is one pixel and writes its own half-edges to other new ones.
-    std::atomic<std::size_t> added{0};
     const auto w = static_cast<std::size_t>(points_.width);
-    forEach(fresh_.size(), 1024, [&](std::size_t f) {
-        const std::size_t i = fresh_[f];
+    const auto connectPixel = [&](std::size_t i) {
         const VertexId id = vertexOf_[i];
         const auto connect = [&](std::size_t j, std::uint16_t code) {
             if (code != ViewPoints::kNoEdge && isFresh_[j] != 0) {
@@ -42,10 +39,20 @@ void Merger::connectNew(GraphStorage& storage, MergeResult& result) {
         if (i >= w) {
             connect(i - w, points_.down[i - w]);
         }
-        added.fetch_add(mine, std::memory_order_relaxed);
-    });
-    storage.countEdges(added.load());
-    result.newEdges += added.load();
+        return mine;
+    };
+    const std::size_t added = parallelReduce(
+        fresh_.size(), 1024, std::size_t{0},
+        [&](std::size_t begin, std::size_t end) {
+            std::size_t sum = 0;
+            for (std::size_t f = begin; f != end; ++f) {
+                sum += connectPixel(fresh_[f]);
+            }
+            return sum;
+        },
+        [](std::size_t a, std::size_t b) { return a + b; });
+    storage.countEdges(added);
+    result.newEdges += added;
 }
 
 bool Merger::wanted(const GraphStorage& storage, const NewEdge& e) const {
@@ -73,28 +80,32 @@ void Merger::compareEdges(GraphStorage& storage, int strip) {
     const auto w = static_cast<std::size_t>(points_.width);
     const std::size_t line = points_.index(0, first);
     const std::size_t pixels = w * static_cast<std::size_t>(end - first);
-    lists.resize(2 * pixels + 2 * kEdgePadding);
-    VertexId *a = lists.a.data(), *b = lists.b.data();
-    std::uint32_t* code = lists.code.data();
-    std::size_t count = 0;
-    for (const auto& [codes, ahead] :
-         {std::pair{points_.right.data(), std::size_t{1}}, std::pair{points_.down.data(), w}}) {
-        count += listEdges({&vertexOf_[line], &isFresh_[line], codes + line, pixels, ahead},
-                           a + count, b + count, code + count);
-    }
+    lists.resize(pixels + kEdgePadding);
+    const EdgeList list{lists.from.data(), lists.right.data(), lists.down.data(),
+                        lists.codes.data()};
+    const std::size_t count = listEdges(
+        {&vertexOf_[line], &isFresh_[line], &points_.right[line], &points_.down[line], pixels, w},
+        list);
     NewEdge* missing = lists.missing.data();
     EdgeScratch::Lower* lower = lists.lower.data();
-    for (std::size_t e = 0; e < count; ++e) {
-        constexpr std::size_t kAhead = 16;
-        storage.prefetchEdges(a[std::min(e + kAhead, count - 1)]);
-        const GraphStorage::HalfEdge found = storage.lookUp(a[e], b[e]);
-        const auto seen = static_cast<std::uint16_t>(code[e]);
-        const std::uint16_t old = weightAt(*found.weight);
-        *lower = {found.weight, a[e], b[e], seen};
-        lower += static_cast<unsigned>(found.there) &
-                 static_cast<unsigned>(compact::smallerWeight(old, seen) != old);
-        *missing = {a[e], b[e], seen};
-        missing += static_cast<unsigned>(!found.there);
+    for (std::size_t k = 0; k < count; ++k) {
+        constexpr std::size_t kAhead = 12;
+        storage.prefetchEdges(list.from[std::min(k + kAhead, count - 1)]);
+        const VertexId a = list.from[k];
+        const GraphStorage::VertexEdges edges = storage.edgesOf(a);
+        const auto compare = [&](VertexId b, std::uint16_t seen) {
+            const GraphStorage::HalfEdge found = storage.lookUp(edges, b);
+            const std::uint16_t old = weightAt(*found.weight);
+            const bool concerned = b != kNoVertex;
+            const bool lowers = compact::smallerWeight(old, seen) != old;
+            *lower = {found.weight, a, b, seen};
+            lower += static_cast<unsigned>(concerned) & static_cast<unsigned>(found.there) &
+                     static_cast<unsigned>(lowers);
+            *missing = {a, b, seen};
+            missing += static_cast<unsigned>(concerned) & static_cast<unsigned>(!found.there);
+        };
+        compare(list.right[k], static_cast<std::uint16_t>(list.codes[k] & 0xFFFFU));
+        compare(list.down[k], static_cast<std::uint16_t>(list.codes[k] >> 16U));
     }
     for (const auto* l = lists.lower.data(); l != lower; ++l) {
         if (lowerWeight(*l->there, l->code)) {

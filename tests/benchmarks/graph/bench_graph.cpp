@@ -231,11 +231,13 @@ void queries(const PixelGraph& graph, Report& report) {
 bool searches(Report& report) {
     PixelGraph graph;
     synthetic::growTo(graph, 1'000'000);
-    const riftmap::AstarComparison c = riftmap::compareAstar(graph, 20);
+    const riftmap::AstarComparison c = riftmap::compareAstar(graph, 15, 7);
     report.add("astar_vertices", static_cast<double>(graph.vertexCount()), "1");
     report.add("astar_ms_median", c.ownMs, "ms");
     report.add("astar_boost_ms_median", c.boostMs, "ms");
     report.add("astar_time_ratio_boost", c.ratio, "1");
+    report.add("astar_time_ratio_lowest_turn", c.lowestTurn, "1");
+    report.add("astar_time_ratio_highest_turn", c.highestTurn, "1");
     report.add("astar_length_difference", c.largestDifference, "1");
     report.add("astar_unreachable", static_cast<double>(c.unreachable), "1");
     return c.largestDifference < 1e-9;

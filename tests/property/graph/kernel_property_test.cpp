@@ -357,31 +357,40 @@ TEST(GraphKernels, ListedEdgesAreThoseBetweenDifferentVerticesNotBothNew) {
         SCOPED_TRACE("seed " + std::to_string(seed));
         Random random(seed);
         const auto count = static_cast<std::size_t>(1 + random.below(100));
-        const auto ahead = static_cast<std::size_t>(1 + random.below(20));
-        const std::size_t all = count + ahead + kEdgePadding;
+        const auto width = static_cast<std::size_t>(1 + random.below(20));
+        const std::size_t all = count + width + kEdgePadding;
         std::vector<VertexId> vertex(all);
         std::vector<std::uint8_t> fresh(all);
-        std::vector<std::uint16_t> code(all);
+        std::vector<std::uint16_t> right(all), down(all);
         for (std::size_t i = 0; i < all; ++i) {
             vertex[i] = static_cast<VertexId>(random.below(5));
             fresh[i] = static_cast<std::uint8_t>(random.below(2));
-            code[i] = random.below(4) == 0 ? ViewPoints::kNoEdge
-                                           : static_cast<std::uint16_t>(random.below(0xFFFF));
+            for (auto* code : {&right[i], &down[i]}) {
+                *code = random.below(4) == 0 ? ViewPoints::kNoEdge
+                                             : static_cast<std::uint16_t>(random.below(0xFFFF));
+            }
         }
-        std::vector<VertexId> a(all), b(all);
-        std::vector<std::uint32_t> c(all);
-        const std::size_t n = listEdges({vertex.data(), fresh.data(), code.data(), count, ahead},
-                                        a.data(), b.data(), c.data());
+        std::vector<VertexId> a(all), b(all), c(all);
+        std::vector<std::uint32_t> codes(all);
+        const std::size_t n =
+            listEdges({vertex.data(), fresh.data(), right.data(), down.data(), count, width},
+                      {a.data(), b.data(), c.data(), codes.data()});
         std::size_t k = 0;
         for (std::size_t i = 0; i < count; ++i) {
-            if (code[i] == ViewPoints::kNoEdge || vertex[i] == vertex[i + ahead] ||
-                (fresh[i] != 0 && fresh[i + ahead] != 0)) {
+            const auto end = [&](std::uint16_t code, std::size_t j) {
+                const bool nothing = code == ViewPoints::kNoEdge || vertex[i] == vertex[j] ||
+                                     (fresh[i] != 0 && fresh[j] != 0);
+                return nothing ? kNoVertex : vertex[j];
+            };
+            const VertexId beside = end(right[i], i + 1), below = end(down[i], i + width);
+            if (beside == kNoVertex && below == kNoVertex) {
                 continue;
             }
             ASSERT_LT(k, n);
             EXPECT_EQ(a[k], vertex[i]);
-            EXPECT_EQ(b[k], vertex[i + ahead]);
-            EXPECT_EQ(c[k], code[i]);
+            EXPECT_EQ(b[k], beside);
+            EXPECT_EQ(c[k], below);
+            EXPECT_EQ(codes[k], right[i] | (static_cast<std::uint32_t>(down[i]) << 16U));
             ++k;
         }
         EXPECT_EQ(k, n);

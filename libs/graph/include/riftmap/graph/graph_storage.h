@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
+#include <future>
 #include <limits>
 #include <memory>
 #include <unordered_map>
@@ -218,18 +219,28 @@ class GraphStorage {
         std::uint16_t* weight;
         bool there;
     };
-    HalfEdge lookUp(VertexId a, VertexId b) {
+    struct VertexEdges {
+        VertexId* neighbour;
+        std::uint16_t* weight;
+        bool overflow;
+    };
+    VertexEdges edgesOf(VertexId a) {
         Page& p = page(pageOf(a));
         const std::uint32_t slot = slotOf(a);
-        const auto& neighbour = p.neighbour[slot];
-        const unsigned equal = (neighbour[0] == b ? 1U : 0U) | (neighbour[1] == b ? 2U : 0U) |
-                               (neighbour[2] == b ? 4U : 0U) | (neighbour[3] == b ? 8U : 0U);
-        if ((p.state[slot] & kOverflow) != 0 && (equal & 7U) == 0) {
-            std::uint16_t* found = findInChunks(neighbour[Page::kInline - 1], b);
-            return {found != nullptr ? found : p.weight[slot].data(), found != nullptr};
-        }
-        return {&p.weight[slot][static_cast<unsigned>(std::countr_zero(equal | 8U))], equal != 0};
+        return {p.neighbour[slot].data(), p.weight[slot].data(), (p.state[slot] & kOverflow) != 0};
     }
+    /// For kNoVertex the result says nothing.
+    HalfEdge lookUp(const VertexEdges& a, VertexId b) {
+        const VertexId* n = a.neighbour;
+        const unsigned equal = (n[0] == b ? 1U : 0U) | (n[1] == b ? 2U : 0U) |
+                               (n[2] == b ? 4U : 0U) | (n[3] == b ? 8U : 0U);
+        if (a.overflow && (equal & 7U) == 0) {
+            std::uint16_t* found = findInChunks(n[Page::kInline - 1], b);
+            return {found != nullptr ? found : a.weight, found != nullptr};
+        }
+        return {&a.weight[static_cast<unsigned>(std::countr_zero(equal | 8U))], equal != 0};
+    }
+    HalfEdge lookUp(VertexId a, VertexId b) { return lookUp(edgesOf(a), b); }
     const std::uint16_t* findHalfEdge(VertexId a, VertexId b) const {
         return const_cast<GraphStorage*>(this)->findHalfEdge(a, b);
     }
@@ -308,7 +319,8 @@ class GraphStorage {
         void operator()(Page* pages) const { std::free(pages); }
     };
     using PageChunk = std::unique_ptr<Page, FreeChunk>;
-    PageChunk newChunk() const;
+    static PageChunk newChunk(bool large);
+    PageChunk takeChunk();
 
     struct KeyHash {
         std::size_t operator()(const BlockKey& k) const;
@@ -327,9 +339,10 @@ class GraphStorage {
     }
 
     double blockSize_;
-    float levelScale_;               ///< levelOf()
-    std::int32_t levels_ = 0;        ///< in use: above the highest
-    std::vector<PageChunk> chunks_;  ///< kPagesPerChunk pages each
+    float levelScale_;                  ///< levelOf()
+    std::int32_t levels_ = 0;           ///< in use: above the highest
+    std::vector<PageChunk> chunks_;     ///< kPagesPerChunk pages each
+    std::future<PageChunk> nextChunk_;  ///< being made ready while the last one fills
     std::uint32_t pageCount_ = 0;
     std::vector<PageBounds> bounds_;        ///< of pages
     std::vector<std::uint32_t> freePages_;  ///< a heap, smallest on top: as after loading
