@@ -9,6 +9,7 @@
 #include <exception>
 #include <utility>
 
+#include "all_programs.h"
 #include "riftmap/core/text.h"
 #include "riftmap/core/version.h"
 
@@ -96,6 +97,23 @@ void Program::declareCommonFlags() {
     line_.flag("version", 0, version_, "prints the version and ends");
 }
 
+/// The files may also hold sections of other programs, which are checked all the same: what one
+/// program was run with, another one judges or plays back with.
+void Program::loadConfiguration() {
+    if (line_.configFiles().empty()) {
+        return;
+    }
+    const std::vector<std::unique_ptr<Program>> programs = allPrograms();
+    std::vector<OptionTable*> others;
+    for (const auto& program : programs) {
+        program->declare();
+        others.push_back(&program->table_);
+    }
+    for (const auto& file : line_.configFiles()) {
+        table_.load(file, others);
+    }
+}
+
 bool Program::initialize(int argc, const char* const* argv) {
     return initialize(std::vector<std::string>(argv + (argc > 0 ? 1 : 0), argv + argc));
 }
@@ -115,9 +133,7 @@ bool Program::initialize(const std::vector<std::string>& arguments) {
     }
     setMinLoggingLevel(verbosityFrom(verbosity_));
     loadPlugins();
-    for (const auto& file : line_.configFiles()) {
-        table_.load(file);
-    }
+    loadConfiguration();
     for (const auto& assignment : sets_) {
         table_.set(assignment);
     }

@@ -244,7 +244,12 @@ void OptionTable::assign(const std::string& section, const std::string& key,
                       nearestName(key, keys) + "'?");
 }
 
-void OptionTable::load(const std::string& file) {
+bool OptionTable::hasSection(const std::string& name) const {
+    return std::any_of(sections_.begin(), sections_.end(),
+                       [&](const auto& s) { return lower(s.first) == lower(name); });
+}
+
+void OptionTable::load(const std::string& file, const std::vector<OptionTable*>& others) {
     if (!std::filesystem::is_regular_file(file)) {
         throw ConfigError(file + ": no such configuration file");
     }
@@ -268,19 +273,21 @@ void OptionTable::load(const std::string& file) {
             const int line = lineOf(file, section, key);
             return file + (line > 0 ? ":" + std::to_string(line) : "") + ": ";
         };
-        if (keys.empty()) {  // still worth the check of its name
-            const bool known = std::any_of(sections_.begin(), sections_.end(), [&](const auto& s) {
-                return lower(s.first) == lower(section);
+        OptionTable* owner = this;
+        if (!hasSection(section)) {
+            const auto other = std::find_if(others.begin(), others.end(), [&](OptionTable* table) {
+                return table->hasSection(section);
             });
-            if (!known && !section.empty()) {
-                assign(section, "", "", where(""));
-            }
+            owner = other == others.end() ? this : *other;
+        }
+        if (keys.empty() && !section.empty() && !owner->hasSection(section)) {
+            owner->assign(section, "", "", where(""));  // still worth the check of its name
         }
         for (const auto& key : keys) {
             if (key.starts_with("//")) {  // MRPT's parser takes a comment with a '=' for a key
                 continue;
             }
-            assign(section, key, ini.read_string(section, key, "", true), where(key));
+            owner->assign(section, key, ini.read_string(section, key, "", true), where(key));
         }
     }
 }

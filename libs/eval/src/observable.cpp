@@ -18,7 +18,7 @@ namespace riftmap {
 
 namespace {
 
-constexpr std::uint32_t kMethodVersion = 3;
+constexpr std::uint32_t kMethodVersion = 4;
 
 /// Most samples are seen along one of a few lines of sight. Deep inside what is hidden a moderate
 /// fan will do, for each sample's fan is turned differently; the finest one is for the rim of what
@@ -75,21 +75,37 @@ class SightFinder {
           reachable_(reachable),
           samples_(samples),
           cosLimit_(std::cos(maxIncidence)),
+          lowest_(sineOf(space.minElevation)),
+          highest_(sineOf(space.maxElevation)),
           offset_(surfaceOffset(samples)) {}
 
-    /// Looks outwards along a fan of `count` directions a side.
-    Sight lookOut(std::size_t sample, int count, std::uint64_t round) const {
+    /// Points around a circle, each the golden angle on from the one before.
+    static std::vector<Eigen::Vector2d> goldenCircle(int count) {
+        std::vector<Eigen::Vector2d> points;
+        for (int k = 0; k < count; ++k) {
+            points.emplace_back(std::cos(kGoldenAngle * k), std::sin(kGoldenAngle * k));
+        }
+        return points;
+    }
+
+    /// Looks outwards along a fan of directions a side, one for each point of goldenCircle().
+    Sight lookOut(std::size_t sample, const std::vector<Eigen::Vector2d>& circle) const {
+        const auto count = static_cast<int>(circle.size());
         const Eigen::Vector3d normal = samples_.normals[sample].cast<double>();
-        const Eigen::Vector3d u = normal.unitOrthogonal();
+        const double turn = phase(sample, circle.size());
+        // The circle turned by the sample's own phase.
+        const double turnAngle = 6.283185307179586 * turn;
+        const Eigen::Vector3d u0 = normal.unitOrthogonal();
+        const Eigen::Vector3d v0 = normal.cross(u0);
+        const Eigen::Vector3d u = std::cos(turnAngle) * u0 + std::sin(turnAngle) * v0;
         const Eigen::Vector3d v = normal.cross(u);
-        const double turn = phase(sample, round);
         for (const int side : {1, -1}) {
             for (int k = 0; k < count; ++k) {
                 const double cosine = 1 - (k + turn) / static_cast<double>(count) * (1 - cosLimit_);
                 const double sine = std::sqrt(std::max(0.0, 1 - cosine * cosine));
-                const double angle = kGoldenAngle * k + 6.283185307179586 * turn;
+                const Eigen::Vector2d& at = circle[static_cast<std::size_t>(k)];
                 const Eigen::Vector3d direction =
-                    side * cosine * normal + sine * (std::cos(angle) * u + std::sin(angle) * v);
+                    side * cosine * normal + sine * (at.x() * u + at.y() * v);
                 if (const auto eye = lookAlong(sample, side, direction)) {
                     return {eye->cast<float>(), static_cast<std::int8_t>(side)};
                 }
@@ -120,9 +136,13 @@ class SightFinder {
     }
 
  private:
+    static double sineOf(double elevation) {
+        return std::sin(std::clamp(elevation, -1.5707963267948966, 1.5707963267948966));
+    }
+
     bool elevationAllowed(const Eigen::Vector3d& fromSample) const {
-        const double elevation = std::asin(std::clamp(-fromSample.z(), -1.0, 1.0));
-        return elevation >= space_.minElevation && elevation <= space_.maxElevation;
+        constexpr double kRounding = 1e-12;
+        return -fromSample.z() >= lowest_ - kRounding && -fromSample.z() <= highest_ + kRounding;
     }
 
     double freeLength(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
@@ -193,6 +213,7 @@ class SightFinder {
     const ReachableSpace& reachable_;
     const SurfaceSamples& samples_;
     double cosLimit_;
+    double lowest_, highest_;  ///< sine of the elevations that the camera looks up and down at most
     double offset_;
 };
 
@@ -315,11 +336,11 @@ ObservableSet observableSet(const RayCaster& caster, const ViewSpace& space,
         const Spreading spreading(finder, samples);
         for (const Round& round : roundsOf(options.directions, spacingOf(samples))) {
             const std::vector<Sight> before = sights;
+            const std::vector<Eigen::Vector2d> circle = SightFinder::goldenCircle(round.directions);
             tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
                 if (before[i].side == 0 &&
                     (!round.onlyBesideSeen || spreading.besideSeen(i, before))) {
-                    sights[i] = finder.lookOut(i, round.directions,
-                                               static_cast<std::uint64_t>(round.directions));
+                    sights[i] = finder.lookOut(i, circle);
                 }
             });
             spreading.run(sights);

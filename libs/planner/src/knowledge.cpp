@@ -21,6 +21,19 @@ std::optional<Eigen::AlignedBox3d> toBox(const std::vector<double>& v) {
                                Eigen::Vector3d(v[3], v[4], v[5]));
 }
 
+/// Part s of the turn from one optical axis to another, about the vertical and up or down: the
+/// horizon stays level and the tilt between those of the two.
+Eigen::Vector3d axisBetween(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double s) {
+    const auto azimuth = [](const Eigen::Vector3d& d) { return std::atan2(d.y(), d.x()); };
+    const auto tilt = [](const Eigen::Vector3d& d) {
+        return std::atan2(d.z(), std::hypot(d.x(), d.y()));
+    };
+    const double turn = std::remainder(azimuth(b) - azimuth(a), 2 * 3.14159265358979323846);
+    const double around = azimuth(a) + s * turn;
+    const double up = tilt(a) + s * (tilt(b) - tilt(a));
+    return {std::cos(up) * std::cos(around), std::cos(up) * std::sin(around), std::sin(up)};
+}
+
 constexpr int kBeside = 2;  // [voxels] that the camera may go beyond those that are clear
 
 double cellSizeOf(const PlannerOptions& options, const PixelGraph& graph) {
@@ -101,7 +114,7 @@ Knowledge::Knowledge(const PixelGraph& graph, const PlatformLimits& limits,
       options_(options),
       surfaceBox_(toBox(options.surfaceBox)),
       cameraBox_(cameraBoxOf(limits)),
-      summary_(cellSizeOf(options, graph)),
+      summary_(cellSizeOf(options, graph), graph.options().targetResolution),
       space_(gridBox(limits, surfaceBox_),
              voxelSizeOf(options, gridBox(limits, surfaceBox_), limits.clearance)),
       ledger_(graph.options().targetResolution, options.maxAttempts) {
@@ -207,9 +220,9 @@ std::vector<Pose> Knowledge::pathTo(const Pose& goal) const {
     double walked = 0;
     for (std::size_t i = 1; i + 1 < corners.size(); ++i) {
         walked += (corners[i] - corners[i - 1]).norm();
-        Pose pose = interpolate(camera_, goal, length > 0 ? walked / length : 1.0);
-        pose.translation = corners[i];
-        path.push_back(pose);
+        const Eigen::Vector3d axis = axisBetween(camera_.rotation.col(2), goal.rotation.col(2),
+                                                 length > 0 ? walked / length : 1.0);
+        path.push_back(lookAt(corners[i], corners[i] + axis));
     }
     path.push_back(goal);
     return path;

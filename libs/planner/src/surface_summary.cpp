@@ -31,7 +31,7 @@ struct Sums {
     Eigen::Vector3d position = Eigen::Vector3d::Zero(), normal = Eigen::Vector3d::Zero();
     Eigen::Vector3d openPosition = Eigen::Vector3d::Zero(), outward = Eigen::Vector3d::Zero();
     Eigen::Vector3d tornNormal = Eigen::Vector3d::Zero(), coarseNormal = Eigen::Vector3d::Zero();
-    double jump = 0;
+    double jump = 0, doubt = 0;
     std::uint32_t vertices = 0, torn = 0, coarse = 0, open = 0, high = 0;
     std::uint8_t kinds = 0;
 };
@@ -51,6 +51,16 @@ Eigen::Vector3d outwardAt(const PixelGraph& graph, VertexId id, const Vertex& v,
     sum -= n * n.dot(sum);
     const double length = sum.norm();
     return length > 1.0 ? Eigen::Vector3d(sum / length) : sum;
+}
+
+/// Share of the surface at a coarse vertex that is not within the resolution of the map: for its
+/// noise is Gaussian along the ray, and a little for what lies between vertices that are too far
+/// apart.
+double shareInDoubt(float sigma, double resolution) {
+    constexpr double kBetween = 0.05;
+    return kBetween + (sigma > 0
+                           ? std::erfc(resolution / (std::sqrt(2.0) * static_cast<double>(sigma)))
+                           : 0.0);
 }
 
 SurfaceCell toCell(const Sums& s, std::uint64_t key, double cell) {
@@ -75,6 +85,7 @@ SurfaceCell toCell(const Sums& s, std::uint64_t key, double cell) {
         c.jump = s.high > 0 ? static_cast<float>(s.jump / s.high) : 0.0F;
         c.rim = static_cast<float>(std::min(s.torn * spacing, 2.0 * cell));
         c.coarse = static_cast<float>(cell * cell * s.coarse / s.vertices);
+        c.doubt = static_cast<float>(cell * cell * s.doubt / s.vertices);
     }
     if (s.torn > 0) {
         c.outward = (s.outward / s.torn).cast<float>();
@@ -84,9 +95,11 @@ SurfaceCell toCell(const Sums& s, std::uint64_t key, double cell) {
 
 }  // namespace
 
-SurfaceSummary::SurfaceSummary(double cell) : cell_(cell) {
-    if (!(cell > 0)) {
-        throw std::invalid_argument("surface summary: the cell size must be positive");
+SurfaceSummary::SurfaceSummary(double cell, double resolution)
+    : cell_(cell), resolution_(resolution) {
+    if (!(cell > 0) || !(resolution > 0)) {
+        throw std::invalid_argument(
+            "surface summary: the cell size and the resolution must be positive");
     }
 }
 
@@ -205,6 +218,7 @@ SurfaceSummary::Block SurfaceSummary::build(const PixelGraph& graph, std::uint64
             s.tornNormal += v.normal.cast<double>();
         } else {
             ++s.coarse;
+            s.doubt += shareInDoubt(v.sigma, resolution_);
             s.coarseNormal += v.normal.cast<double>();
         }
     });

@@ -58,6 +58,7 @@ ViewScorer::ViewScorer(const SensorModel& sensor, const SurfaceSummary& summary,
       ledger_(&ledger),
       space_(&space),
       weights_(weights),
+      resolution_(resolution),
       goodDepth_(sensor.goodDepth(resolution)) {
     for (const auto& [key, block] : summary.blocks()) {
         BlockView b{block.box.center().cast<float>(),
@@ -100,7 +101,7 @@ ViewScorer::Benefit ViewScorer::benefit(const RiftRecord& record,
     const double afar = kNewSurfaceDepth * goodDepth_;
     const double torn = distance <= afar ? 1.0 : std::pow(afar / distance, 2);
     const double coarse = std::clamp((1.6 * goodDepth_ - distance) / (0.6 * goodDepth_), 0.0, 1.0);
-    const double vain = std::pow(0.8, record.attempts.size());
+    const double vain = std::pow(weights_.vain, record.attempts.size());
     const double cell = summary_->cellSize();
     // What a step hides is about as wide as the step is deep.
     const double reach = std::clamp(0.5 * static_cast<double>(record.cell.jump),
@@ -251,13 +252,20 @@ std::vector<Eigen::Vector3d> ViewScorer::unknownSeen(const Pose& world_T_camera)
     return places;
 }
 
+double ViewScorer::hiddenWidth(const SurfaceCell& cell) const {
+    constexpr double kShallow = 2, kDeep = 8;  // [resolutions]
+    constexpr double kLeast = 0.02;
+    const double depth = static_cast<double>(cell.jump) / resolution_;
+    const double share = std::clamp((depth - kShallow) / (kDeep - kShallow), kLeast, 1.0);
+    return weights_.reach * share * summary_->cellSize();
+}
+
 std::vector<float> ViewScorer::worth() const {
     std::vector<float> worth;
     worth.reserve(2 * (open_.size() + frontier_.size()));
-    const double cell = summary_->cellSize();
     for (const RiftRecord* record : open_) {
-        worth.push_back(record->cell.rim * static_cast<float>(weights_.reach * cell));
-        worth.push_back(record->cell.coarse * static_cast<float>(weights_.coarse));
+        worth.push_back(record->cell.rim * static_cast<float>(hiddenWidth(record->cell)));
+        worth.push_back(record->cell.doubt);
     }
     for (const FreeSpace::Frontier& f : frontier_) {
         const float area = static_cast<float>(weights_.unknown) * f.area.norm();

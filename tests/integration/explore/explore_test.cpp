@@ -47,6 +47,19 @@ int explore(const Arguments& arguments) {
     return runProgram(program, arguments);
 }
 
+/// A ground robot refuses every pose whose horizon is not level or whose tilt it does not have,
+/// also between the views.
+TEST(Explore, aGroundRobotFindsItsWay) {
+    const TemporaryFolder folder;
+    const auto run = folder / "run";
+    ASSERT_EQ(explore(Arguments{kConfig + "explore-courtyard.ini", "--set", "Noise.level=N0",
+                                "--set", "Stop.max_views=12", "--set", "Explore.judge=false",
+                                "--set", "Explore.rawlog=false", "--out", run.string()} +
+                      kSmallCamera),
+              0);
+    EXPECT_EQ(readCsv(run / "steps.csv").rows.size(), 12U);
+}
+
 TEST(Explore, fillsItsRunDirectory) {
     const TemporaryFolder folder;
     const auto run = folder / "run";

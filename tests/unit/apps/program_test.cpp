@@ -126,6 +126,22 @@ TEST(Program, ReadsConfigurationThenFlags) {
     EXPECT_EQ(program.threadLimit, 2U);
 }
 
+// One file configures several programs; a mistake in what another program reads is found too.
+TEST(Program, SectionsOfOtherProgramsAreCheckedButNotTaken) {
+    SampleProgram program;
+    const auto shared =
+        writeIni("shared.ini", "[Explore]\nplanner=random\n[baseline]\n[Sample]\nlength=2\n");
+    ASSERT_TRUE(program.initialize({shared, "a"}));
+    EXPECT_EQ(program.length, 2);
+    expectUsageError({writeIni("value.ini", "[Explore]\nplanner=rndom\n"), "a"},
+                     "[Explore] planner = 'rndom'");
+    expectUsageError({writeIni("key.ini", "[Stop]\nmax_view=3\n"), "a"},
+                     "unknown key 'max_view' in [Stop]; did you mean 'max_views'?");
+    expectUsageError({writeIni("nowhere.ini", "[Explor]\nplanner=random\n"), "a"},
+                     "unknown section [Explor]");
+    expectUsageError({"a", "--set", "Explore.planner=random"}, "unknown section [Explore]");
+}
+
 TEST(Program, CommandLineBeatsFile) {
     SampleProgram program;
     const auto file = writeIni("seed.ini", "[Run]\nseed=5\nthreads=2\n");

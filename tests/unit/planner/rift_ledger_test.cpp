@@ -35,7 +35,7 @@ class LedgerOnWall : public testing::Test {
         return o;
     }
     PixelGraph graph{options()};
-    SurfaceSummary summary{0.2};
+    SurfaceSummary summary{0.2, 0.05};
     RiftLedger ledger{0.05, 3};
 };
 

@@ -83,6 +83,7 @@ class Program : public mrpt::system::COutputLogger {
 
  private:
     void declare();
+    void loadConfiguration();
     void declareCommonFlags();
     void loadPlugins();
     std::string usageText() const;

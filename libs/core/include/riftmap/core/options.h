@@ -69,9 +69,11 @@ class OptionTable {
             });
     }
 
-    /// Reads an INI file. Throws ConfigError: missing file, unknown section or key (with the
-    /// nearest known one), a value that does not parse or is out of range; with file and line.
-    void load(const std::string& file);
+    /// Reads an INI file. A section that this table lacks may belong to one of `others`, which
+    /// checks it: one file configures several programs. Throws ConfigError: missing file, unknown
+    /// section or key (with the nearest known one), a value that does not parse or is out of
+    /// range; with file and line.
+    void load(const std::string& file, const std::vector<OptionTable*>& others = {});
     /// "Section.key=value", as --set gives it; `where` opens the message. Throws ConfigError.
     void set(const std::string& assignment, const std::string& where = "--set");
 
@@ -83,6 +85,7 @@ class OptionTable {
     std::string markdown() const;
 
     const std::vector<Option>& options() const { return options_; }
+    bool hasSection(const std::string& name) const;  ///< in upper or lower case
 
  private:
     void addNamed(const std::string& key, const std::vector<std::string>& names,

@@ -31,6 +31,7 @@ struct SurfaceCell {
     float rim = 0;     ///< length of the tear in this cell, about [m]
     float jump = 0;    ///< mean length of the high edges across it [m]; 0 where none is left
     float coarse = 0;  ///< area sampled too sparsely or known too badly, about [m^2]
+    float doubt = 0;   ///< part of it that is probably farther from the map than was asked [m^2]
 };
 
 /// The map as the planner looks at it: a few thousand cells instead of millions of vertices, kept
@@ -38,8 +39,9 @@ struct SurfaceCell {
 /// is thread-safe while nothing writes.
 class SurfaceSummary {
  public:
-    /// `cell`: edge of a cell [m], > 0.
-    explicit SurfaceSummary(double cell);
+    /// `cell`: edge of a cell [m]; `resolution`: how finely and accurately the surface is asked to
+    /// be known [m]; both > 0.
+    SurfaceSummary(double cell, double resolution);
 
     double cellSize() const { return cell_; }
     /// Sums up anew all blocks of cells that this view has surface in or looks through.
@@ -63,7 +65,7 @@ class SurfaceSummary {
 
     Block build(const PixelGraph& graph, std::uint64_t blockKey) const;
 
-    double cell_;
+    double cell_, resolution_;
     std::map<std::uint64_t, Block> blocks_;
     std::vector<std::uint64_t> changed_;
 };

@@ -34,6 +34,7 @@ class ViewScorer {
         double reach = 1.5;    ///< width of the strip that closing a tear brings, in cells ...
         double farthestReach = 4.0;  ///< ... and beyond deep steps at most
         double coarse = 0.35;        ///< of surface known better against surface known at all
+        double vain = 0.8;  ///< what is left of the worth of a tear after a view that did not help
     };
 
     /// Everything must outlive the scorer and stay as it is.
@@ -76,6 +77,11 @@ class ViewScorer {
     std::optional<std::size_t> frontierOf(std::uint32_t item) const;
 
  private:
+    /// Width of what is hidden at a tear of an object, on average [m]. What lies less than two
+    /// resolutions behind a step is within one of the surface on either side of it, and where
+    /// there is no step the frontier counts what may lie beyond.
+    double hiddenWidth(const SurfaceCell& cell) const;
+
     struct BlockView {
         Eigen::Vector3f centre;
         float radius;
@@ -95,6 +101,7 @@ class ViewScorer {
     const RiftLedger* ledger_;
     const FreeSpace* space_;
     Weights weights_;
+    double resolution_;
     double goodDepth_;
     std::vector<BlockView> blocks_;
     std::vector<const RiftRecord*> open_;  ///< by block, then key
