@@ -92,7 +92,7 @@ void PlannerOptions::describe(OptionTable& table) {
     table.add("min_gain", minGain, 0, 1, "",
               "A view that adds less than this share of the surface known is not worth taking");
     table.add("max_attempts", maxAttempts, 1, 100, "",
-              "Different views of a tear that may fail before it counts as unobservable");
+              "Different views of a tear that may fail before it is given up");
     table.add("unknown_weight", unknownWeight, 0, 100, "",
               "Weight of unknown space looked into against tears to be closed");
     table.add("clearance_margin", clearanceMargin, 0, 10, "m",

@@ -44,7 +44,9 @@ void RiftLedger::updateCell(const SurfaceCell& cell, double cellSize) {
         r.reason = "shorter than the asked resolution";
         return;
     }
-    const bool givenUp = r.state == RiftState::kUnreachable || r.state == RiftState::kUnobservable;
+    const bool exhausted = static_cast<int>(r.attempts.size()) >= maxAttempts_;
+    const bool givenUp =
+        r.state == RiftState::kUnreachable || r.state == RiftState::kUnobservable || exhausted;
     if (!givenUp) {
         r.state = RiftState::kOpen;
         r.reason.clear();
@@ -69,7 +71,8 @@ void RiftLedger::update(const SurfaceSummary& summary) {
         }
     }
     for (auto& [key, r] : records_) {
-        if (r.state != RiftState::kResolved && summary.find(key) == nullptr) {
+        if (r.state != RiftState::kResolved && summary.hasChanged(key) &&
+            summary.find(key) == nullptr) {
             r.state = RiftState::kResolved;
             r.reason = "seen through";
         }
@@ -91,8 +94,9 @@ void RiftLedger::judge(const SurfaceSummary& summary, const std::vector<std::uin
         const Eigen::Vector3f ray = eye.cast<float>() - r.cell.openPosition;
         r.attempts.push_back({ray.normalized(), ray.norm()});
         if (static_cast<int>(r.attempts.size()) >= maxAttempts_) {
-            giveUp(keys[i], RiftState::kUnobservable,
-                   std::to_string(r.attempts.size()) + " views of it did not close it");
+            giveUp(keys[i], RiftState::kBelowResolution,
+                   std::to_string(r.attempts.size()) +
+                       " views of it did not close it: finer than they resolve");
         }
     }
 }

@@ -196,18 +196,40 @@ void Choice::refine(const Candidate& best) {
     }
 }
 
+void Choice::rate(Candidate& c, const ViewScore& score) const {
+    c.score = score;
+    // What is too near is not measured, and hides what is behind it.
+    const double gain = score.gain * std::max(0.0, 1.0 - 2.5 * score.nearShare);
+    c.utility = gain / (k_.options().viewCost + c.path);
+}
+
 void Choice::scoreFrom(std::size_t first) {
-    tbb::parallel_for(
-        tbb::blocked_range<std::size_t>(first, candidates_.size(), 4),
-        [&](const tbb::blocked_range<std::size_t>& range) {
-            for (std::size_t i = range.begin(); i < range.end(); ++i) {
-                Candidate& c = candidates_[i];
-                c.score = k_.surfaceBox() ? scoreAround(c.pose) : scorer_.score(c.pose);
-                // What is too near is not measured, and hides what is behind it.
-                const double gain = c.score.gain * std::max(0.0, 1.0 - 2.5 * c.score.nearShare);
-                c.utility = gain / (k_.options().viewCost + c.path);
-            }
-        });
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(first, candidates_.size(), 4),
+                      [&](const tbb::blocked_range<std::size_t>& range) {
+                          for (std::size_t i = range.begin(); i < range.end(); ++i) {
+                              const Pose& pose = candidates_[i].pose;
+                              rate(candidates_[i],
+                                   k_.surfaceBox() ? scoreAround(pose) : scorer_.score(pose));
+                          }
+                      });
+}
+
+/// Where there are more open cells than can be weighed for every candidate, those that an estimate
+/// likes best are left.
+void Choice::preselect() {
+    constexpr std::size_t kLeft = 64;
+    if (!scorer_.samples() || candidates_.size() <= kLeft) {
+        return;
+    }
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, candidates_.size(), 4),
+                      [&](const tbb::blocked_range<std::size_t>& range) {
+                          for (std::size_t i = range.begin(); i < range.end(); ++i) {
+                              rate(candidates_[i], scorer_.estimate(candidates_[i].pose));
+                          }
+                      });
+    std::stable_sort(candidates_.begin(), candidates_.end(),
+                     [](const Candidate& a, const Candidate& b) { return a.utility > b.utility; });
+    candidates_.resize(kLeft);
 }
 
 const Candidate* Choice::best() const {
@@ -244,6 +266,44 @@ bool Choice::lineOfSight(const Eigen::Vector3d& eye, const Eigen::Vector3d& targ
     return true;
 }
 
+/// Views of a tear from places that can be reached and have it in their range and in sight, drawn
+/// by lot from all of them; false if no place is within the range.
+bool Choice::addAllInSight(const RiftRecord& record, std::size_t most) {
+    const Eigen::Vector3d p = record.cell.openPosition.cast<double>();
+    const double nearest = 1.02 * k_.sensor().nearLimit;
+    std::vector<Eigen::Vector3d> places = k_.space().reachable(1);
+    std::erase_if(places, [&](const Eigen::Vector3d& eye) {
+        const double distance = (eye - p).norm();
+        return distance < nearest || distance > k_.sensor().farLimit;
+    });
+    const std::size_t wanted = candidates_.size() + most;
+    for (std::size_t i = 0; i < places.size() && candidates_.size() < wanted; ++i) {
+        std::swap(places[i], places[i + random_() % (places.size() - i)]);
+        if (scorer_.benefit(record, places[i]).quality >= 0.1 && lineOfSight(places[i], p)) {
+            add(places[i], p);
+        }
+    }
+    return !places.empty();
+}
+
+void Choice::giveUp(const RiftRecord& record, bool reachable, bool visible) {
+    const std::uint64_t key = record.cell.key;
+    const std::string tries = std::to_string(record.attempts.size());
+    if (!reachable) {
+        k_.ledger().giveUp(key, RiftState::kUnreachable,
+                           "no place within the range of it is known to be free");
+    } else if (!visible && record.attempts.empty()) {
+        k_.ledger().giveUp(key, RiftState::kUnobservable,
+                           "hidden from every place that can be reached");
+    } else if (!visible) {
+        k_.ledger().giveUp(key, RiftState::kBelowResolution,
+                           "from all sides that see it views did not close it (" + tries +
+                               "): finer than they resolve");
+    } else {
+        k_.ledger().giveUp(key, RiftState::kBelowResolution, "too small to be worth a view");
+    }
+}
+
 /// No candidate was worth it. Every tear that is left gets candidates of its own, from all sides;
 /// one that even these do not help is given up, with the reason.
 std::optional<ViewPlan> Choice::lastResorts(double minGain) {
@@ -261,12 +321,15 @@ std::optional<ViewPlan> Choice::lastResorts(double minGain) {
         if (k_.surfaceBox()) {
             addInSight(*record, 60, 60);
         }
-        const bool reachable = !candidates_.empty();
         const Eigen::Vector3d p = record->cell.openPosition.cast<double>();
         std::erase_if(candidates_, [&](const Candidate& c) {
             return scorer_.benefit(*record, c.pose.translation).quality < 0.1 ||
                    !lineOfSight(c.pose.translation, p);
         });
+        bool reachable = true;
+        if (candidates_.empty()) {  // before it is said that there is none: all places
+            reachable = addAllInSight(*record, 12);
+        }
         const bool visible = !candidates_.empty();
         if (candidates_.size() > 12) {
             std::stable_sort(candidates_.begin(), candidates_.end(),
@@ -285,16 +348,7 @@ std::optional<ViewPlan> Choice::lastResorts(double minGain) {
         if (const Candidate* c = best()) {
             return planFor(*c);
         }
-        const std::uint64_t key = record->cell.key;
-        if (!reachable) {
-            k_.ledger().giveUp(key, RiftState::kUnreachable,
-                               "no place within the range of it is known to be free");
-        } else if (!visible) {
-            k_.ledger().giveUp(key, RiftState::kUnobservable,
-                               "hidden from every place that can be reached");
-        } else {
-            k_.ledger().giveUp(key, RiftState::kBelowResolution, "too small to be worth a view");
-        }
+        giveUp(*record, reachable, visible);
     }
     return std::nullopt;
 }
@@ -322,6 +376,7 @@ std::optional<ViewPlan> Choice::make() {
     addTurns();
     addPlaces();
     addPool();
+    preselect();
     scoreFrom(0);
     for (int round = 0; round < 2; ++round) {
         if (const Candidate* b = best()) {

@@ -107,10 +107,17 @@ std::uint64_t SurfaceSummary::keyOf(const Eigen::Vector3d& point) const {
     return pack((point / cell_).array().floor().cast<int>());
 }
 
+std::uint64_t SurfaceSummary::blockOf(std::uint64_t cell) {
+    static_assert(kCellsPerSide == 8);
+    return pack(unpack(cell).unaryExpr([](int x) { return x >> 3; }));
+}
+
+bool SurfaceSummary::hasChanged(std::uint64_t cell) const {
+    return std::binary_search(changed_.begin(), changed_.end(), blockOf(cell));
+}
+
 const SurfaceCell* SurfaceSummary::find(std::uint64_t key) const {
-    const Eigen::Vector3i block =
-        unpack(key).unaryExpr([](int x) { return static_cast<int>(std::floor(x / 8.0)); });
-    const auto it = blocks_.find(pack(block));
+    const auto it = blocks_.find(blockOf(key));
     if (it == blocks_.end()) {
         return nullptr;
     }

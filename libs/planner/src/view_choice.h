@@ -42,10 +42,14 @@ class Choice {
     void keepPool();
     void refine(const Candidate& best);
     ViewScore scoreAround(const Pose& pose) const;
+    void rate(Candidate& candidate, const ViewScore& score) const;
     void scoreFrom(std::size_t first);
+    void preselect();
     const Candidate* best() const;
     std::vector<Eigen::Vector3d> frontierSeen(const Pose& pose) const;
     std::optional<ViewPlan> planFor(const Candidate& candidate) const;
+    bool addAllInSight(const RiftRecord& record, std::size_t most);
+    void giveUp(const RiftRecord& record, bool reachable, bool visible);
     std::optional<ViewPlan> lastResorts(double minGain);
     bool lineOfSight(const Eigen::Vector3d& eye, const Eigen::Vector3d& target) const;
     std::optional<ViewPlan> makeAround(const Eigen::AlignedBox3d& box);

@@ -206,7 +206,17 @@ bool ViewScorer::visible(const DepthBuffer& buffer, const Eigen::Vector3f& inCam
     return buffer.at(column, row) >= inCamera.z() - slack;
 }
 
+ViewScore ViewScorer::estimate(const Pose& world_T_camera) const {
+    return scoreEvery((open_.size() + kMostOpen - 1) / kMostOpen, world_T_camera);
+}
+
 ViewScore ViewScorer::score(const Pose& world_T_camera) const {
+    return scoreEvery(1, world_T_camera);
+}
+
+/// Weighs one open cell in `stride` for as many.
+ViewScore ViewScorer::scoreEvery(std::size_t stride, const Pose& world_T_camera) const {
+    stride = std::max<std::size_t>(stride, 1);
     ViewScore result;
     const Pose camera_T_world = world_T_camera.inverse();
     std::vector<const BlockView*> seen;
@@ -215,7 +225,8 @@ ViewScore ViewScorer::score(const Pose& world_T_camera) const {
     const StereoCamera& camera = sensor_.camera;
     const double cell = summary_->cellSize();
     for (const BlockView* block : seen) {
-        for (std::size_t i = block->firstOpen; i < block->lastOpen; ++i) {
+        const std::size_t first = (block->firstOpen + stride - 1) / stride * stride;
+        for (std::size_t i = first; i < block->lastOpen; i += stride) {
             const RiftRecord& record = *open_[i];
             const Eigen::Vector3f p =
                 (camera_T_world * record.cell.openPosition.cast<double>()).cast<float>();
@@ -226,7 +237,7 @@ ViewScore ViewScorer::score(const Pose& world_T_camera) const {
             if (b.area <= 0) {
                 continue;
             }
-            result.openGain += b.area;
+            result.openGain += static_cast<double>(stride) * b.area;
             if (b.quality > 0.5) {
                 result.cells.push_back(record.cell.key);
             }

@@ -78,7 +78,7 @@ TEST_F(LedgerOnWall, vainTriesAreNotRepeatedAndEndTheTear) {
     ledger.judge(summary, {key}, {before}, p + Eigen::Vector3d(-1, 1, 0));
     EXPECT_EQ(record.state, RiftState::kOpen);
     ledger.judge(summary, {key}, {before}, p + Eigen::Vector3d(-1, -1, 0));
-    EXPECT_EQ(record.state, RiftState::kUnobservable);
+    EXPECT_EQ(record.state, RiftState::kBelowResolution);
     EXPECT_EQ(record.attempts.size(), 3U);
     EXPECT_FALSE(record.reason.empty());
 }

@@ -17,8 +17,9 @@ enum class RiftState {
     kOpen,             ///< a view may close it
     kDeferred,         ///< it may, but the run ended before (limits on views, metres, seconds)
     kUnreachable,      ///< no place known to be free lies within the range of it
-    kUnobservable,     ///< views from several sides did not close it, or none sees it
-    kBelowResolution,  ///< smaller than the surface was asked to be known
+    kUnobservable,     ///< hidden from every place that can be reached
+    kBelowResolution,  ///< smaller than the surface was asked to be known, or too small to be worth
+                       ///< a view, or finer than the views of it resolved
     kResolved,         ///< was open, is closed
 };
 inline constexpr std::size_t kRiftStates = 6;
@@ -42,8 +43,7 @@ struct RiftRecord {
 };
 
 /// The memory of the run: every tear that was ever seen, by cell. A try that closed nothing is
-/// remembered; after several different ones the tear counts as unobservable, until the surface at
-/// it changes.
+/// remembered; after several different ones the tear is given up, until the surface at it changes.
 class RiftLedger {
  public:
     /// `resolution` [m]: tears shorter than about this do not count. `maxAttempts` >= 1.

@@ -55,12 +55,15 @@ class SurfaceSummary {
     const std::map<std::uint64_t, Block>& blocks() const { return blocks_; }
     /// Keys of the blocks that the last update worked on.
     const std::vector<std::uint64_t>& changed() const { return changed_; }
+    /// Whether it worked on the block of this cell.
+    bool hasChanged(std::uint64_t cell) const;
     /// Nothing if the cell holds no vertex.
     const SurfaceCell* find(std::uint64_t key) const;
     std::uint64_t keyOf(const Eigen::Vector3d& point) const;
     std::size_t cellCount() const;
 
  private:
+    static std::uint64_t blockOf(std::uint64_t cell);
     static constexpr int kCellsPerSide = 8;
 
     Block build(const PixelGraph& graph, std::uint64_t blockKey) const;

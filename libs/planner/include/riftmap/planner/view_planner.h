@@ -28,7 +28,7 @@ struct PlannerOptions {
     double viewCost = 4.0;  ///< what taking a view costs, in metres of path
     double minGain =
         5e-4;             ///< a view that adds less than this share of the surface is not worth it
-    int maxAttempts = 4;  ///< views of a tear that may fail before it counts as unobservable
+    int maxAttempts = 4;  ///< views of a tear that may fail before it is given up
     double unknownWeight = 0.5;     ///< of unknown space looked into, against tears to be closed
     double clearanceMargin = 0.02;  ///< beyond the platform's clearance [m]
     int targets = 48;               ///< tears that candidates are made for, in one plan

@@ -42,6 +42,10 @@ class ViewScorer {
                const FreeSpace& space, double resolution, const Weights& weights);
 
     ViewScore score(const Pose& world_T_camera) const;
+    /// The same from a sample of the open cells where there are many (samples()), so that its time
+    /// does not grow with them; `cells` holds those of the sample.
+    ViewScore estimate(const Pose& world_T_camera) const;
+    bool samples() const { return open_.size() > kMostOpen; }
     /// Unknown places that the view would look into.
     std::vector<Eigen::Vector3d> unknownSeen(const Pose& world_T_camera) const;
     /// Area that seeing this open cell from there would bring, without occlusion [m^2], and the
@@ -77,6 +81,9 @@ class ViewScorer {
     std::optional<std::size_t> frontierOf(std::uint32_t item) const;
 
  private:
+    static constexpr std::size_t kMostOpen = 6000;  ///< open cells that an estimate weighs
+
+    ViewScore scoreEvery(std::size_t stride, const Pose& world_T_camera) const;
     /// Width of what is hidden at a tear of an object, on average [m]. What lies less than two
     /// resolutions behind a step is within one of the surface on either side of it, and where
     /// there is no step the frontier counts what may lie beyond.
