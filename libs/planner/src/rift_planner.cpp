@@ -266,24 +266,56 @@ bool Choice::lineOfSight(const Eigen::Vector3d& eye, const Eigen::Vector3d& targ
     return true;
 }
 
-/// Views of a tear from places that can be reached and have it in their range and in sight, drawn
-/// by lot from all of them; false if no place is within the range.
-bool Choice::addAllInSight(const RiftRecord& record, std::size_t most) {
+/// The first place along a line out of a tear from where it can be seen: within the range, known to
+/// be reachable, not tried, and nothing in the map before it, however near to the line that is.
+std::optional<Eigen::Vector3d> Choice::lookOut(const RiftRecord& record,
+                                               const Eigen::Vector3d& out) const {
     const Eigen::Vector3d p = record.cell.openPosition.cast<double>();
+    const double resolution = k_.resolution();
     const double nearest = 1.02 * k_.sensor().nearLimit;
-    std::vector<Eigen::Vector3d> places = k_.space().reachable(1);
-    std::erase_if(places, [&](const Eigen::Vector3d& eye) {
-        const double distance = (eye - p).norm();
-        return distance < nearest || distance > k_.sensor().farLimit;
-    });
-    const std::size_t wanted = candidates_.size() + most;
-    for (std::size_t i = 0; i < places.size() && candidates_.size() < wanted; ++i) {
-        std::swap(places[i], places[i + random_() % (places.size() - i)]);
-        if (scorer_.benefit(record, places[i]).quality >= 0.1 && lineOfSight(places[i], p)) {
-            add(places[i], p);
+    const double stride = std::max(resolution, 0.5 * k_.space().voxelSize());
+    double step = resolution;
+    for (double s = 3 * resolution; s < k_.sensor().farLimit; s += step) {
+        const Eigen::Vector3d at = p + s * out;
+        const bool free = k_.space().at(at) == FreeSpace::State::kFree;
+        step = free ? stride : resolution;
+        if (!free && k_.graph().nearest(at.cast<float>(), static_cast<float>(0.5 * resolution))) {
+            return std::nullopt;
+        }
+        if (s > nearest && std::isfinite(k_.space().distanceTo(at)) &&
+            !RiftLedger::tried(record, at)) {
+            return at;
         }
     }
-    return !places.empty();
+    return std::nullopt;
+}
+
+/// Views of a tear from where it can be seen, found by looking out of it to all sides.
+void Choice::addAllInSight(const RiftRecord& record, std::size_t most) {
+    constexpr int kDirections = 400;
+    constexpr double kFacing = 0.2;  // cosine: surface seen at a flatter angle is not measured well
+    const Eigen::Vector3d p = record.cell.openPosition.cast<double>();
+    const bool step = (record.cell.kinds & kDepthStep) != 0;  // what it hides may face any way
+    const std::size_t wanted = candidates_.size() + most;
+    for (int i = 0; i < kDirections && candidates_.size() < wanted; ++i) {
+        const double z = 1 - (2 * i + 1.0) / kDirections;
+        const double r = std::sqrt(1 - z * z);
+        const Eigen::Vector3d out(r * std::cos(2.399963 * i), r * std::sin(2.399963 * i), z);
+        if (step || out.dot(record.cell.openNormal.cast<double>()) > kFacing) {
+            if (const auto eye = lookOut(record, out)) {
+                add(*eye, p);
+            }
+        }
+    }
+}
+
+/// Whether the camera can be anywhere where this place is within its range.
+bool Choice::inRange(const Eigen::Vector3d& place) const {
+    const std::vector<Eigen::Vector3d> eyes = k_.space().reachable(1);
+    return std::any_of(eyes.begin(), eyes.end(), [&](const Eigen::Vector3d& eye) {
+        const double distance = (eye - place).norm();
+        return distance > k_.sensor().nearLimit && distance < k_.sensor().farLimit;
+    });
 }
 
 void Choice::giveUp(const RiftRecord& record, bool reachable, bool visible) {
@@ -327,8 +359,9 @@ std::optional<ViewPlan> Choice::lastResorts(double minGain) {
                    !lineOfSight(c.pose.translation, p);
         });
         bool reachable = true;
-        if (candidates_.empty()) {  // before it is said that there is none: all places
-            reachable = addAllInSight(*record, 12);
+        if (candidates_.empty()) {  // before it is said that there is none: from all sides
+            addAllInSight(*record, 12);
+            reachable = !candidates_.empty() || inRange(p);
         }
         const bool visible = !candidates_.empty();
         if (candidates_.size() > 12) {

@@ -48,7 +48,10 @@ class Choice {
     const Candidate* best() const;
     std::vector<Eigen::Vector3d> frontierSeen(const Pose& pose) const;
     std::optional<ViewPlan> planFor(const Candidate& candidate) const;
-    bool addAllInSight(const RiftRecord& record, std::size_t most);
+    std::optional<Eigen::Vector3d> lookOut(const RiftRecord& record,
+                                           const Eigen::Vector3d& out) const;
+    bool inRange(const Eigen::Vector3d& place) const;
+    void addAllInSight(const RiftRecord& record, std::size_t most);
     void giveUp(const RiftRecord& record, bool reachable, bool visible);
     std::optional<ViewPlan> lastResorts(double minGain);
     bool lineOfSight(const Eigen::Vector3d& eye, const Eigen::Vector3d& target) const;

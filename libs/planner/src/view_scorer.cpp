@@ -32,15 +32,17 @@ struct ViewScorer::DepthBuffer {
         return depth[static_cast<std::size_t>(row) * static_cast<std::size_t>(width) +
                      static_cast<std::size_t>(column)];
     }
+    /// The nearest pixel, -1 for all that lie before the first: without a call of the library.
+    static int nearest(float x) { return static_cast<int>(std::clamp(x, -1.0F, 1e6F) + 1.5F) - 1; }
     /// Draws a square that faces the camera; p in its frame, half the edge in metres.
     void splat(const Eigen::Vector3f& p, float half) {
         const float r = fx * half / p.z();
         const float u = fx * p.x() / p.z() + cx;
         const float v = fy * p.y() / p.z() + cy;
-        const int c0 = std::max(0, static_cast<int>(std::lround(u - r)));
-        const int c1 = std::min(width - 1, static_cast<int>(std::lround(u + r)));
-        const int r0 = std::max(0, static_cast<int>(std::lround(v - r)));
-        const int r1 = std::min(height - 1, static_cast<int>(std::lround(v + r)));
+        const int c0 = std::max(0, nearest(u - r));
+        const int c1 = std::min(width - 1, nearest(u + r));
+        const int r0 = std::max(0, nearest(v - r));
+        const int r1 = std::min(height - 1, nearest(v + r));
         for (int row = r0; row <= r1; ++row) {
             for (int column = c0; column <= c1; ++column) {
                 float& d = at(column, row);
@@ -156,10 +158,10 @@ ViewScorer::DepthBuffer ViewScorer::draw(const Pose& camera_T_world,
 }
 
 template <class F>
-void ViewScorer::forEachUnknown(const Pose& world_T_camera, const DepthBuffer& b,
+void ViewScorer::forEachUnknown(const Pose& world_T_camera, const DepthBuffer& b, int stride,
                                 const F& f) const {
-    for (int row = 0; row < b.height; row += kRayStride) {
-        for (int column = sensor_.firstColumn / kPixels; column < b.width; column += kRayStride) {
+    for (int row = 0; row < b.height; row += stride) {
+        for (int column = sensor_.firstColumn / kPixels; column < b.width; column += stride) {
             const Eigen::Vector3d inCamera(
                 static_cast<double>((static_cast<float>(column) - b.cx) / b.fx),
                 static_cast<double>((static_cast<float>(row) - b.cy) / b.fy), 1.0);
@@ -207,15 +209,16 @@ bool ViewScorer::visible(const DepthBuffer& buffer, const Eigen::Vector3f& inCam
 }
 
 ViewScore ViewScorer::estimate(const Pose& world_T_camera) const {
-    return scoreEvery((open_.size() + kMostOpen - 1) / kMostOpen, world_T_camera);
+    return scoreEvery((open_.size() + kMostOpen - 1) / kMostOpen, 2 * kRayStride, world_T_camera);
 }
 
 ViewScore ViewScorer::score(const Pose& world_T_camera) const {
-    return scoreEvery(1, world_T_camera);
+    return scoreEvery(1, kRayStride, world_T_camera);
 }
 
-/// Weighs one open cell in `stride` for as many.
-ViewScore ViewScorer::scoreEvery(std::size_t stride, const Pose& world_T_camera) const {
+/// Weighs one open cell in `stride` for as many, and one ray in `rayStride` along both axes.
+ViewScore ViewScorer::scoreEvery(std::size_t stride, int rayStride,
+                                 const Pose& world_T_camera) const {
     stride = std::max<std::size_t>(stride, 1);
     ViewScore result;
     const Pose camera_T_world = world_T_camera.inverse();
@@ -244,8 +247,8 @@ ViewScore ViewScorer::scoreEvery(std::size_t stride, const Pose& world_T_camera)
         }
     }
     std::sort(result.cells.begin(), result.cells.end());
-    const double side = static_cast<double>(kPixels * kRayStride) / camera.fx;
-    forEachUnknown(world_T_camera, buffer, [&](const Eigen::Vector3d&, double depth) {
+    const double side = static_cast<double>(kPixels * rayStride) / camera.fx;
+    forEachUnknown(world_T_camera, buffer, rayStride, [&](const Eigen::Vector3d&, double depth) {
         const double z = std::min(depth, kNewSurfaceDepth * goodDepth_);
         result.unknownGain += side * side * z * z;
     });
@@ -258,7 +261,7 @@ std::vector<Eigen::Vector3d> ViewScorer::unknownSeen(const Pose& world_T_camera)
     std::vector<const BlockView*> seen;
     const DepthBuffer buffer = draw(world_T_camera.inverse(), seen);
     std::vector<Eigen::Vector3d> places;
-    forEachUnknown(world_T_camera, buffer,
+    forEachUnknown(world_T_camera, buffer, kRayStride,
                    [&](const Eigen::Vector3d& p, double) { places.push_back(p); });
     return places;
 }

@@ -83,7 +83,7 @@ class ViewScorer {
  private:
     static constexpr std::size_t kMostOpen = 6000;  ///< open cells that an estimate weighs
 
-    ViewScore scoreEvery(std::size_t stride, const Pose& world_T_camera) const;
+    ViewScore scoreEvery(std::size_t stride, int rayStride, const Pose& world_T_camera) const;
     /// Width of what is hidden at a tear of an object, on average [m]. What lies less than two
     /// resolutions behind a step is within one of the surface on either side of it, and where
     /// there is no step the frontier counts what may lie beyond.
@@ -101,7 +101,8 @@ class ViewScorer {
     double nearShareOf(const DepthBuffer& buffer) const;
     bool visible(const DepthBuffer& buffer, const Eigen::Vector3f& inCamera, float slack) const;
     template <class F>
-    void forEachUnknown(const Pose& world_T_camera, const DepthBuffer& buffer, const F& f) const;
+    void forEachUnknown(const Pose& world_T_camera, const DepthBuffer& buffer, int stride,
+                        const F& f) const;
 
     SensorModel sensor_;
     const SurfaceSummary* summary_;
