@@ -106,10 +106,10 @@ GraphStorage::PageChunk GraphStorage::newChunk(bool large) {
 }
 
 /// The first touch of fresh memory costs more than filling it: up to 5 ms for a chunk where a
-/// virtual machine has to be given it first. So once a map has a few chunks, the next one is
-/// touched by another thread while the last one fills.
+/// virtual machine has to be given it first. So once a chunk is little beside the map, the next one
+/// is touched by another thread while the last one fills.
 GraphStorage::PageChunk GraphStorage::takeChunk() {
-    constexpr std::size_t kSmallMap = 4;
+    constexpr std::size_t kSmallMap = 64;  // chunks
     PageChunk chunk =
         nextChunk_.valid() ? nextChunk_.get() : newChunk(!chunks_.empty());  // 2 MB are not little
     if (chunks_.size() >= kSmallMap) {
