@@ -401,6 +401,15 @@ TEST(GraphProperty, SavedGraphsComeBackEqual) {
         back.load(first);
         back.save(second);
         EXPECT_TRUE(first.str() == second.str());
+        const auto edges = [](const PixelGraph& of, VertexId id) {
+            std::map<VertexId, float> found;
+            of.forEachEdge(id, [&found](VertexId n, float w) { found[n] = w; });
+            return found;
+        };
+        graph.forEachVertex([&](VertexId id) {
+            ASSERT_TRUE(back.alive(id));
+            EXPECT_EQ(edges(graph, id), edges(back, id));
+        });
         const GraphComparison same = compareGraphs(graph, back, 1e-4);
         EXPECT_EQ(same.onlyInA + same.onlyInB, 0U);
         EXPECT_EQ(same.verticesA, same.verticesB);
