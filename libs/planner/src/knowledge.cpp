@@ -24,12 +24,15 @@ std::optional<Eigen::AlignedBox3d> toBox(const std::vector<double>& v) {
 /// Part s of the turn from one optical axis to another, about the vertical and up or down: the
 /// horizon stays level and the tilt between those of the two.
 Eigen::Vector3d axisBetween(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double s) {
-    const auto azimuth = [](const Eigen::Vector3d& d) { return std::atan2(d.y(), d.x()); };
+    const auto azimuth = [](const Eigen::Vector3d& d, const Eigen::Vector3d& other) {
+        const Eigen::Vector3d& known = std::hypot(d.x(), d.y()) > 1e-6 ? d : other;
+        return std::atan2(known.y(), known.x());
+    };
     const auto tilt = [](const Eigen::Vector3d& d) {
         return std::atan2(d.z(), std::hypot(d.x(), d.y()));
     };
-    const double turn = std::remainder(azimuth(b) - azimuth(a), 2 * 3.14159265358979323846);
-    const double around = azimuth(a) + s * turn;
+    const double turn = std::remainder(azimuth(b, a) - azimuth(a, b), 2 * 3.14159265358979323846);
+    const double around = azimuth(a, b) + s * turn;
     const double up = tilt(a) + s * (tilt(b) - tilt(a));
     return {std::cos(up) * std::cos(around), std::cos(up) * std::sin(around), std::sin(up)};
 }

@@ -98,8 +98,14 @@ ViewScore Choice::scoreAround(const Pose& pose) const {
     score.nearShare = seen.nearShare;
     score.gain = SeenItems(worth_).gain(TourView{seen.sights, 0});
     for (const Sight& s : seen.sights) {
-        if (const auto cell = scorer_.cellOf(s.item); cell && s.share > 0.25F) {
-            score.cells.push_back(scorer_.open()[*cell]->cell.key);
+        const auto cell = scorer_.cellOf(s.item);
+        if (!cell) {
+            continue;
+        }
+        // Well enough to count as a try, however little is left of its worth.
+        const RiftRecord& record = *scorer_.open()[*cell];
+        if (static_cast<double>(s.share) > 0.25 * scorer_.leftAfterTries(record)) {
+            score.cells.push_back(record.cell.key);
         }
     }
     std::sort(score.cells.begin(), score.cells.end());

@@ -6,6 +6,15 @@
 
 namespace riftmap {
 
+namespace {
+
+std::string vainReason(const RiftRecord& record) {
+    return std::to_string(record.attempts.size()) +
+           " views of it did not close it: finer than they resolve";
+}
+
+}  // namespace
+
 const char* nameOf(RiftState state) {
     constexpr std::array<const char*, kRiftStates> names = {
         "open", "deferred", "unreachable", "unobservable", "below_resolution", "resolved"};
@@ -50,6 +59,9 @@ void RiftLedger::updateCell(const SurfaceCell& cell, double cellSize) {
     if (!givenUp) {
         r.state = RiftState::kOpen;
         r.reason.clear();
+    } else if (r.state == RiftState::kResolved) {  // torn again, though views of it were in vain
+        r.state = RiftState::kBelowResolution;
+        r.reason = vainReason(r);
     } else if (r.reconsidered < 2 && cell.vertices > r.verticesThen + r.verticesThen / 3 + 8) {
         // New surface came up beside it.
         ++r.reconsidered;
@@ -95,8 +107,7 @@ void RiftLedger::judge(const SurfaceSummary& summary, const std::vector<std::uin
         r.attempts.push_back({ray.normalized(), ray.norm()});
         if (static_cast<int>(r.attempts.size()) >= maxAttempts_) {
             giveUp(keys[i], RiftState::kBelowResolution,
-                   std::to_string(r.attempts.size()) +
-                       " views of it did not close it: finer than they resolve");
+                   vainReason(r));
         }
     }
 }

@@ -24,7 +24,7 @@ ViewScorer::Weights weightsFor(const Knowledge& k) {
         // that gains come true: predicted against measured on two objects.
         weights.reach = 0.3;
         weights.coarse = 0.15;
-        weights.vain = 0.4;
+        weights.vain = 0.6;
     }
     return weights;
 }
@@ -267,7 +267,7 @@ bool Choice::lineOfSight(const Eigen::Vector3d& eye, const Eigen::Vector3d& targ
 }
 
 /// The first place along a line out of a tear from where it can be seen: within the range, known to
-/// be reachable, not tried, and nothing in the map before it, however near to the line that is.
+/// be reachable, not tried, and no vertex of the map within half the resolution of the line to it.
 std::optional<Eigen::Vector3d> Choice::lookOut(const RiftRecord& record,
                                                const Eigen::Vector3d& out) const {
     const Eigen::Vector3d p = record.cell.openPosition.cast<double>();
@@ -297,11 +297,13 @@ void Choice::addAllInSight(const RiftRecord& record, std::size_t most) {
     const Eigen::Vector3d p = record.cell.openPosition.cast<double>();
     const bool step = (record.cell.kinds & kDepthStep) != 0;  // what it hides may face any way
     const std::size_t wanted = candidates_.size() + most;
-    for (int i = 0; i < kDirections && candidates_.size() < wanted; ++i) {
+    const Eigen::Vector3d normal = record.cell.openNormal.cast<double>();
+    for (int k = 0; k < kDirections && candidates_.size() < wanted; ++k) {
+        const int i = k * 247 % kDirections;  // so that the first ones are from all sides, too
         const double z = 1 - (2 * i + 1.0) / kDirections;
         const double r = std::sqrt(1 - z * z);
         const Eigen::Vector3d out(r * std::cos(2.399963 * i), r * std::sin(2.399963 * i), z);
-        if (step || out.dot(record.cell.openNormal.cast<double>()) > kFacing) {
+        if (step || normal.isZero() || out.dot(normal) > kFacing) {
             if (const auto eye = lookOut(record, out)) {
                 add(*eye, p);
             }
@@ -332,7 +334,7 @@ void Choice::giveUp(const RiftRecord& record, bool reachable, bool visible) {
                            "from all sides that see it views did not close it (" + tries +
                                "): finer than they resolve");
     } else {
-        k_.ledger().giveUp(key, RiftState::kBelowResolution, "too small to be worth a view");
+        k_.ledger().giveUp(key, RiftState::kBelowResolution, "no view of it would show enough to be worth taking");
     }
 }
 

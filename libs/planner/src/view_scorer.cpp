@@ -79,6 +79,10 @@ ViewScorer::ViewScorer(const SensorModel& sensor, const SurfaceSummary& summary,
     }
 }
 
+double ViewScorer::leftAfterTries(const RiftRecord& record) const {
+    return std::pow(weights_.vain, record.attempts.size());
+}
+
 ViewScorer::Benefit ViewScorer::benefit(const RiftRecord& record,
                                         const Eigen::Vector3d& eye) const {
     if (RiftLedger::tried(record, eye)) {
@@ -103,7 +107,7 @@ ViewScorer::Benefit ViewScorer::benefit(const RiftRecord& record,
     const double afar = kNewSurfaceDepth * goodDepth_;
     const double torn = distance <= afar ? 1.0 : std::pow(afar / distance, 2);
     const double coarse = std::clamp((1.6 * goodDepth_ - distance) / (0.6 * goodDepth_), 0.0, 1.0);
-    const double vain = std::pow(weights_.vain, record.attempts.size());
+    const double vain = leftAfterTries(record);
     const double cell = summary_->cellSize();
     // What a step hides is about as wide as the step is deep.
     const double reach = std::clamp(0.5 * static_cast<double>(record.cell.jump),

@@ -55,6 +55,8 @@ class ViewScorer {
         double torn = 0, coarse = 0;  ///< shares of what the tear and its coarse part are worth
     };
     Benefit benefit(const RiftRecord& record, const Eigen::Vector3d& eye) const;
+    /// Share of a tear's worth that is left after the views of it that did not help.
+    double leftAfterTries(const RiftRecord& record) const;
 
     const std::vector<const RiftRecord*>& open() const { return open_; }
 
