@@ -135,11 +135,14 @@ Bytes blockBytes(const GraphStorage& storage, const Block& block) {
     return out;
 }
 
-/// Throws std::runtime_error if the bytes contradict themselves; the storage holds no part of the
-/// block then.
-void restoreBlock(GraphStorage& storage, const Bytes& bytes) {
+/// `key`: of the block, as the directory has it. Throws std::runtime_error if the bytes contradict
+/// it or themselves; the storage holds no part of the block then.
+void restoreBlock(GraphStorage& storage, const BlockKey& key, const Bytes& bytes) {
     Reader in(bytes);
-    const std::uint32_t block = storage.blockAt(in.get<BlockKey>());
+    if (!(in.get<BlockKey>() == key)) {
+        throw std::runtime_error("calls itself another");
+    }
+    const std::uint32_t block = storage.blockAt(key);
     std::vector<std::uint32_t> pages;
     try {
         for (auto left = in.get<std::uint32_t>(); left > 0; --left) {
@@ -329,7 +332,7 @@ void PixelGraph::load(std::istream& in) {
             if (found == Damage::kChecksum) {
                 throw std::runtime_error("has a wrong checksum");
             }
-            restoreBlock(fresh->storage, bytes);
+            restoreBlock(fresh->storage, keys[b], bytes);
         } catch (const std::runtime_error& e) {
             note("block " + std::to_string(b) + " " + keyName(keys[b]) + " " + e.what());
         }

@@ -106,8 +106,7 @@ void RiftLedger::judge(const SurfaceSummary& summary, const std::vector<std::uin
         const Eigen::Vector3f ray = eye.cast<float>() - r.cell.openPosition;
         r.attempts.push_back({ray.normalized(), ray.norm()});
         if (static_cast<int>(r.attempts.size()) >= maxAttempts_) {
-            giveUp(keys[i], RiftState::kBelowResolution,
-                   vainReason(r));
+            giveUp(keys[i], RiftState::kBelowResolution, vainReason(r));
         }
     }
 }

@@ -334,7 +334,8 @@ void Choice::giveUp(const RiftRecord& record, bool reachable, bool visible) {
                            "from all sides that see it views did not close it (" + tries +
                                "): finer than they resolve");
     } else {
-        k_.ledger().giveUp(key, RiftState::kBelowResolution, "no view of it would show enough to be worth taking");
+        k_.ledger().giveUp(key, RiftState::kBelowResolution,
+                           "no view of it would show enough to be worth taking");
     }
 }
 

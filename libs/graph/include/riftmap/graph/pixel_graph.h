@@ -113,7 +113,7 @@ class PixelGraph {
     /// Everything allocated for the map: vertices, edges, hash, rifts.
     std::size_t memoryBytes() const;
     /// Buffers that merge() keeps from view to view. They grow with what one view sees, not with
-    /// the map.
+    /// the map. Not counted: a few rows of edges that each thread keeps for itself.
     std::size_t bufferBytes() const;
     /// Frees them; the next merge makes them anew. Copies of a graph come without.
     void releaseBuffers();
