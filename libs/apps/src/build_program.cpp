@@ -43,14 +43,18 @@ class RiftHistory {
             }
         }
         for (const auto& rift : rifts) {
-            rows_[rift.id] = {.id = rift.id,
-                              .state = "open",
-                              .reason = "still there when the recording ended",
-                              .type = kindNames(rift.kinds),
-                              .centre = rift.centre,
-                              .normal = rift.normal,
-                              .openVertices = rift.vertices.size(),
-                              .edges = rift.highEdges};
+            const auto [at, isNew] = rows_.try_emplace(rift.id);
+            RiftRow& row = at->second;
+            row.id = rift.id;
+            row.firstView = isNew ? view : row.firstView;
+            row.state = "open";
+            row.reason = "still there when the recording ended";
+            row.type = kindNames(rift.kinds);
+            row.centre = rift.centre;
+            row.normal = rift.normal;
+            row.openVertices = rift.vertices.size();
+            row.edges = rift.highEdges;
+            row.lastView = view;
         }
         open_ = rifts.size();
     }

@@ -182,7 +182,7 @@ void EvalProgram::arguments(CommandLine& line) {
     line.value("world", 0, "NAME|FILE", world_,
                "built-in world or mesh file, in place of World.name and World.mesh");
     line.value("rifts", 0, "FILE", rifts_,
-               "certificate; without it rifts.csv beside the map, where there is one");
+               "certificate; without it rift_cells.csv or else rifts.csv beside the map");
     line.value("rawlog", 0, "FILE", rawlog_,
                "the observations the map was made of, for the cross-check with OctoMap");
 }
@@ -225,8 +225,12 @@ EvalProgram::Map EvalProgram::readMap() const {
     if (out.surface.vertices.empty()) {
         out.surface.vertices = out.points;
     }
-    const fs::path beside = map_.parent_path() / "rifts.csv";
-    const fs::path table = rifts_.empty() && fs::exists(beside) ? beside : rifts_;
+    fs::path table = rifts_;
+    for (const char* beside : {"rift_cells.csv", "rifts.csv"}) {
+        if (table.empty() && fs::exists(map_.parent_path() / beside)) {
+            table = map_.parent_path() / beside;
+        }
+    }
     if (!table.empty()) {
         Certificate certificate = readRifts(table);
         if (!rifts_.empty() || !out.rifts) {

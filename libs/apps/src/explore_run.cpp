@@ -199,7 +199,7 @@ void ExploreRun::onStep(const ExploreStep& step, const Knowledge& knowledge) {
     StepRow row;
     row.time_ns = step.input->time_ns;
     row.world_T_camera = step.input->world_T_camera;
-    row.rifts = knowledge.ledger().counts();
+    row.rifts = explorer_->rifts().counts();
     row.pathLength = step.pathLength;
     row.stereoMs = step.stereoMs;
     row.mergeMs = step.mergeMs;
@@ -269,26 +269,49 @@ void ExploreRun::finish(const std::string& error) {
     scene.taken = taken_;
     const YamlMap more = figures(error);
     recorder_.finish(map_, certificate(), scene, program_.stopReason, more);
+    writeCells();
     writePicture(directory_.file("map.png"), cutawayPicture(points_, normals_, colours_, taken_));
     writeReport();
 }
 
 std::vector<RiftRow> ExploreRun::certificate() const {
     std::vector<RiftRow> rows;
-    for (const auto& [key, r] : explorer_->knowledge().ledger().records()) {
+    for (const auto& [id, r] : explorer_->rifts().rifts()) {
         RiftRow row;
-        row.id = rows.size();
+        row.id = id;
         row.state = nameOf(r.state);
         row.reason = r.reason;
-        row.type = kindNames(r.cell.kinds);
-        row.centre = r.cell.openPosition;
-        row.normal = r.cell.normal;
-        row.openVertices = r.cell.open;
-        row.edges = r.cell.highEdges;
-        row.attempts = r.attempts.size();
+        row.type = kindNames(r.kinds);
+        row.centre = r.centre;
+        row.normal = r.normal;
+        row.openVertices = r.openVertices;
+        row.edges = r.highEdges;
+        row.attempts = r.tries.size();
+        row.extent = r.extent;
+        row.rim = r.rim;
+        row.coarse = r.coarse;
+        row.cells = r.cells.size();
+        row.firstView = r.firstView;
+        row.lastView = r.lastView;
+        row.parents.assign(r.parents.begin(), r.parents.end());
+        row.joined.assign(r.joined.begin(), r.joined.end());
         rows.push_back(row);
     }
     return rows;
+}
+
+/// The pieces of the rifts that are left: places for whoever checks the certificate.
+void ExploreRun::writeCells() const {
+    CsvWriter table(directory_.file("rift_cells.csv"),
+                    {"rift", "state", "reason", "type", "x", "y", "z", "nx", "ny", "nz",
+                     "open_vertices", "edges", "attempts", "rim_m", "coarse_m2"});
+    for (const auto& [key, rift] : explorer_->rifts().owners()) {
+        const RiftRecord& r = explorer_->knowledge().ledger().records().at(key);
+        const SurfaceCell& c = r.cell;
+        table.row({rift, nameOf(r.state), r.reason, kindNames(c.kinds), c.openPosition.x(),
+                   c.openPosition.y(), c.openPosition.z(), c.normal.x(), c.normal.y(), c.normal.z(),
+                   c.open, c.highEdges, r.attempts.size(), c.rim, c.coarse});
+    }
 }
 
 /// What the summary tells beyond what every mapping run tells.
@@ -350,7 +373,7 @@ void ExploreRun::writeReport() const {
         report.path.push_back(pose.translation.cast<float>());
     }
     report.pictures = {directory_.file("map.png")};
-    const auto counts = explorer_->knowledge().ledger().counts();
+    const auto counts = explorer_->rifts().counts();
     for (const auto& [key, r] : explorer_->knowledge().ledger().records()) {
         if (r.state != RiftState::kResolved && r.state != RiftState::kBelowResolution) {
             report.rifts.push_back(r.cell.openPosition);
@@ -365,7 +388,7 @@ void ExploreRun::writeReport() const {
     fact("vertices", graph().vertexCount());
     fact("surface [m2]", graph().surfaceArea());
     for (std::size_t i = 0; i < counts.size(); ++i) {
-        fact(std::string("tears ") + nameOf(static_cast<RiftState>(i)), counts[i]);
+        fact(std::string("rifts ") + nameOf(static_cast<RiftState>(i)), counts[i]);
     }
     for (const DistanceFigures& f : program_.coverage.at) {
         fact("covered within " + deltaName(f.delta) + " (observable)", f.cObs);
@@ -373,7 +396,7 @@ void ExploreRun::writeReport() const {
     }
     ReportDiagram byView{"Covered share of the observable surface", "views", "share", {}};
     ReportDiagram byPath{"Covered share of the observable surface", "path [m]", "share", {}};
-    ReportDiagram open{"Open tears", "views", "cells", {{"open", {}, {}}}};
+    ReportDiagram open{"Cells of open rifts", "views", "cells", {{"open", {}, {}}}};
     ReportDiagram time{"Time a view", "views", "ms", {{"plan", {}, {}}, {"merge", {}, {}}}};
     for (const StepFigures& f : history_) {
         const double n = static_cast<double>(f.step.view + 1);

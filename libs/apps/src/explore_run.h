@@ -37,6 +37,7 @@ class ExploreRun {
     void onStep(const ExploreStep& step, const Knowledge& knowledge);
     std::unique_ptr<ViewPlanner> makePlanner();
     std::vector<RiftRow> certificate() const;
+    void writeCells() const;
     YamlMap figures(const std::string& error);
     void showProgress(const ExploreStep& step, const Knowledge& knowledge) const;
     void finish(const std::string& error);

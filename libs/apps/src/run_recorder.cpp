@@ -38,6 +38,21 @@ double quantile(std::vector<double> values, double q) {
     return *at;
 }
 
+/// Empty where nothing is known.
+template <class T>
+Field fieldOf(const std::optional<T>& value) {
+    return value ? Field(*value) : Field("");
+}
+
+/// "3 17 20"
+Field idsOf(const std::vector<std::uint64_t>& ids) {
+    std::string text;
+    for (const std::uint64_t id : ids) {
+        text += (text.empty() ? "" : " ") + std::to_string(id);
+    }
+    return text;
+}
+
 }  // namespace
 
 std::string kindNames(std::uint8_t kinds) {
@@ -70,7 +85,7 @@ void RunRecorder::step(const PixelGraph& graph, const StepRow& row) {
     fields.insert(fields.end(),
                   {row.pathLength, row.stereoMs, row.mergeMs, row.riftsMs, row.planMs});
     if (withCoverage_) {
-        fields.push_back(row.coverage ? Field(*row.coverage) : Field(""));
+        fields.push_back(fieldOf(row.coverage));
     }
     steps_.row(fields);
     trajectory_ << tumLine({row.time_ns, row.world_T_camera}) << '\n' << std::flush;
@@ -87,13 +102,39 @@ void RunRecorder::finish(const PixelGraphMap& map, const std::vector<RiftRow>& r
     saveMap(run_.file("map.pixelgraph"), map);
     saveScene(run_.file("scene.3Dscene"), map.graph(), scene);
 
-    CsvWriter table(run_.file("rifts.csv"), {"id", "state", "reason", "type", "x", "y", "z", "nx",
-                                             "ny", "nz", "open_vertices", "edges", "attempts"});
-    for (const auto& r : rifts) {
-        table.row({r.id, r.state, r.reason, r.type, r.centre.x(), r.centre.y(), r.centre.z(),
-                   r.normal.x(), r.normal.y(), r.normal.z(), r.openVertices, r.edges, r.attempts});
-    }
+    writeRifts(rifts);
     writeSummary(map.graph(), rifts, stopReason, more);
+}
+
+void RunRecorder::writeRifts(const std::vector<RiftRow>& rifts) const {
+    CsvWriter table(
+        run_.file("rifts.csv"),
+        {"id",    "state",     "reason", "type",          "x",         "y",        "z",
+         "nx",    "ny",        "nz",     "open_vertices", "edges",     "attempts", "extent_m",
+         "rim_m", "coarse_m2", "cells",  "first_view",    "last_view", "parents",  "joined"});
+    for (const auto& r : rifts) {
+        table.row({r.id,
+                   r.state,
+                   r.reason,
+                   r.type,
+                   r.centre.x(),
+                   r.centre.y(),
+                   r.centre.z(),
+                   r.normal.x(),
+                   r.normal.y(),
+                   r.normal.z(),
+                   r.openVertices,
+                   r.edges,
+                   r.attempts,
+                   fieldOf(r.extent),
+                   fieldOf(r.rim),
+                   fieldOf(r.coarse),
+                   fieldOf(r.cells),
+                   r.firstView,
+                   r.lastView,
+                   idsOf(r.parents),
+                   idsOf(r.joined)});
+    }
 }
 
 void RunRecorder::writeSummary(const PixelGraph& graph, const std::vector<RiftRow>& rifts,

@@ -3,35 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "riftmap/core/parallel.h"
+#include "riftmap/core/union_find.h"
 
 namespace riftmap {
 namespace {
-
-/// Components of 0..n-1; the root of a component is its smallest element.
-class UnionFind {
- public:
-    explicit UnionFind(std::size_t n) : parent_(n) {
-        std::iota(parent_.begin(), parent_.end(), 0U);
-    }
-    std::uint32_t root(std::uint32_t i) {
-        while (parent_[i] != i) {
-            parent_[i] = parent_[parent_[i]];
-            i = parent_[i];
-        }
-        return i;
-    }
-    void unite(std::uint32_t a, std::uint32_t b) {
-        a = root(a);
-        b = root(b);
-        parent_[std::max(a, b)] = std::min(a, b);
-    }
-
- private:
-    std::vector<std::uint32_t> parent_;
-};
 
 bool hasHighEdge(const GraphStorage& storage, VertexId id) {
     bool high = false;

@@ -33,7 +33,8 @@ SurfaceExplorer::SurfaceExplorer(CameraPlatform& platform, PixelGraph& graph, Vi
       build_(std::move(build)),
       record_(std::move(record)),
       onStep_(std::move(onStep)),
-      knowledge_(graph, platform.limits(), options) {}
+      knowledge_(graph, platform.limits(), options),
+      rifts_(knowledge_.summary().cellSize()) {}
 
 bool SurfaceExplorer::limitReached(double seconds) {
     if (knowledge_.views() >= static_cast<std::size_t>(stop_.maxViews)) {
@@ -98,6 +99,8 @@ void SurfaceExplorer::look(const std::optional<ViewPlan>& plan, double planMs) {
     }
     step.knowledgeMs = msSince(t);
     lastKnowledgeMs_ = step.knowledgeMs;
+    rifts_.update(step.view, knowledge_.ledger().records(),
+                  plan ? plan->cells : std::vector<std::uint64_t>());
     step.input = &view;
     step.pathLength = pathLength_;
     step.seconds = clock_();
@@ -161,6 +164,7 @@ void SurfaceExplorer::run(const std::atomic<bool>& interrupt) {
     if (stopReason_ != "complete") {
         knowledge_.ledger().deferOpen(stopReason_);
     }
+    rifts_.update(views() - 1, knowledge_.ledger().records(), {});
 }
 
 }  // namespace riftmap

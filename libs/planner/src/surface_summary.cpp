@@ -112,6 +112,24 @@ std::uint64_t SurfaceSummary::blockOf(std::uint64_t cell) {
     return pack(unpack(cell).unaryExpr([](int x) { return x >> 3; }));
 }
 
+Eigen::Vector3i SurfaceSummary::indexOf(std::uint64_t key) {
+    return unpack(key);
+}
+
+std::uint64_t SurfaceSummary::keyAt(const Eigen::Vector3i& index) {
+    return pack(index);
+}
+
+std::array<std::uint64_t, 13> SurfaceSummary::neighbourOffsets() {
+    std::array<std::uint64_t, 13> offsets{};
+    const std::uint64_t middle = pack(Eigen::Vector3i::Zero());
+    for (int i = 0; i < 13; ++i) {
+        const int k = i + 14;  // the 27 of the cube in the order of their keys, from the middle on
+        offsets[static_cast<std::size_t>(i)] = pack({k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1}) - middle;
+    }
+    return offsets;
+}
+
 bool SurfaceSummary::hasChanged(std::uint64_t cell) const {
     return std::binary_search(changed_.begin(), changed_.end(), blockOf(cell));
 }

@@ -109,6 +109,21 @@ TEST_F(EvalCommand, ACertificateExplains) {
     EXPECT_LT(program.report.explained, 1.0) << "nothing but a resolved rift is listed";
 }
 
+/// Whoever has rift_cells.csv is judged by its cells: a rift's one centre says little of a long
+/// one.
+TEST_F(EvalCommand, ACertificateIsJudgedByItsCells) {
+    const std::string columns = "state,x,y,z\n";
+    folder_.write("rifts.csv", columns + "unobservable,0,0,0.5\n");
+    folder_.write("rift_cells.csv", columns + "unobservable,0,0,0.5\nunobservable,0,0.5,0\n" +
+                                        "unreachable,0.5,0,0\nbelow_resolution,-0.5,0,0\n");
+    EvalProgram program;
+    EXPECT_EQ(eval(program, {"--map", in("map.ply"), "--world", in("ball.obj"), "--out",
+                             in("verdict"), "--set", "Judge.pictures=false"})
+                  .code,
+              0);
+    EXPECT_EQ(program.report.verdicts, 3U);
+}
+
 TEST_F(EvalCommand, SameVerdictForOneAndTwoThreads) {
     std::string verdicts[2];
     std::string pictures[2];

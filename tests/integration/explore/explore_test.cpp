@@ -2,6 +2,8 @@
 // riftmap-explore as its user runs it, on a small camera.
 #include <gtest/gtest.h>
 
+#include <map>
+
 #include "riftmap/apps/build_program.h"
 #include "riftmap/apps/explore_program.h"
 #include "riftmap/core/csv.h"
@@ -64,23 +66,65 @@ TEST(Explore, fillsItsRunDirectory) {
     const TemporaryFolder folder;
     const auto run = folder / "run";
     ASSERT_EQ(explore(roomRun(run, "N0", 4)), 0);
-    for (const auto* name : {"graph.ply", "map.pixelgraph", "scene.3Dscene", "trajectory.tum",
-                             "steps.csv", "rifts.csv", "summary.yaml", "config_used.ini",
-                             "manifest.yaml", "run.rawlog", "report.html", "map.png"}) {
+    for (const auto* name :
+         {"graph.ply", "map.pixelgraph", "scene.3Dscene", "trajectory.tum", "steps.csv",
+          "rifts.csv", "rift_cells.csv", "summary.yaml", "config_used.ini", "manifest.yaml",
+          "run.rawlog", "report.html", "map.png"}) {
         EXPECT_TRUE(std::filesystem::exists(run / name)) << name;
     }
     EXPECT_EQ(readCsv(run / "steps.csv").rows.size(), 4U);
-    const CsvTable rifts = readCsv(run / "rifts.csv");
-    const std::size_t state = rifts.column("state");
-    std::size_t deferred = 0;
-    for (const auto& row : rifts.rows) {
-        EXPECT_NE(row[state], "open");  // the run is over
-        deferred += row[state] == "deferred" ? 1 : 0;
-    }
-    EXPECT_GT(deferred, 10U);
     const std::string page = readFile(run / "report.html");
     EXPECT_EQ(page.find("http://"), std::string::npos);
     EXPECT_EQ(page.find("https://"), std::string::npos);
+}
+
+/// Every cell that is left is in the rift of its number, in the same state.
+TEST(Explore, theCertificateHasARowForEachConnectedRift) {
+    const TemporaryFolder folder;
+    const auto run = folder / "run";
+    ASSERT_EQ(explore(roomRun(run, "N0", 4)), 0);
+    const CsvTable rifts = readCsv(run / "rifts.csv");
+    const CsvTable cells = readCsv(run / "rift_cells.csv");
+    EXPECT_EQ(
+        rifts.header,
+        (std::vector<std::string>{
+            "id",    "state",     "reason", "type",          "x",         "y",        "z",
+            "nx",    "ny",        "nz",     "open_vertices", "edges",     "attempts", "extent_m",
+            "rim_m", "coarse_m2", "cells",  "first_view",    "last_view", "parents",  "joined"}));
+    std::map<std::string, std::size_t> cellsOf;
+    std::map<std::string, std::string> stateOf;
+    std::size_t deferred = 0;
+    for (const auto& row : cells.rows) {
+        const std::string& rift = row[cells.column("rift")];
+        const std::string& state = row[cells.column("state")];
+        ++cellsOf[rift];
+        EXPECT_EQ(stateOf.try_emplace(rift, state).first->second, state);
+        EXPECT_NE(state, "open");  // the run is over
+        deferred += state == "deferred" ? 1 : 0;
+    }
+    EXPECT_GT(deferred, 10U);
+    std::map<std::string, int> counts;
+    std::size_t left = 0;
+    for (const auto& row : rifts.rows) {
+        const std::string& state = row[rifts.column("state")];
+        ++counts[state];
+        EXPECT_LE(std::stoul(row[rifts.column("first_view")]),
+                  std::stoul(row[rifts.column("last_view")]));
+        EXPECT_GT(std::stod(row[rifts.column("extent_m")]), 0.0);
+        if (state != "resolved") {
+            ++left;
+            EXPECT_EQ(std::to_string(cellsOf[row[rifts.column("id")]]), row[rifts.column("cells")]);
+            EXPECT_EQ(stateOf[row[rifts.column("id")]], state);
+            EXPECT_EQ(row[rifts.column("last_view")], "3");
+        }
+    }
+    EXPECT_EQ(left, stateOf.size());
+    const std::string summary = readFile(run / "summary.yaml");
+    for (const auto& [state, n] : counts) {
+        EXPECT_NE(summary.find("rifts_" + state + ": " + std::to_string(n) + "\n"),
+                  std::string::npos)
+            << state;
+    }
 }
 
 class ExploreNoise : public testing::TestWithParam<std::string> {};
@@ -103,7 +147,7 @@ TEST(Explore, theNumberOfThreadsChangesNoByte) {
     for (const std::string threads : {"1", "2"}) {
         ASSERT_EQ(explore(roomRun(folder / threads, "N3", 6) + Arguments{"--threads", threads}), 0);
     }
-    for (const auto* name : {"graph.ply", "trajectory.tum", "rifts.csv"}) {
+    for (const auto* name : {"graph.ply", "trajectory.tum", "rifts.csv", "rift_cells.csv"}) {
         EXPECT_EQ(readFile(folder / "1" / name), readFile(folder / "2" / name)) << name;
     }
 }
@@ -119,7 +163,7 @@ TEST(Explore, aResumedRunEndsAsIfItHadNotBeenInterrupted) {
                                 (folder / "cut").string(), "--set", "Stop.max_seconds=1e6",
                                 "--no-progress"}),
               0);
-    for (const auto* name : {"graph.ply", "trajectory.tum", "rifts.csv"}) {
+    for (const auto* name : {"graph.ply", "trajectory.tum", "rifts.csv", "rift_cells.csv"}) {
         EXPECT_EQ(readFile(folder / "whole" / name), readFile(folder / "cut" / name)) << name;
     }
 }

@@ -39,15 +39,22 @@ struct StepRow {
     std::optional<double> coverage;  ///< 0 .. 1, where truth is known
 };
 
-/// A row of rifts.csv, the certificate: what became of one tear. Map frame.
+/// A row of rifts.csv, the certificate: what became of one connected tear. Map frame.
 struct RiftRow {
-    std::uint64_t id = 0;
+    std::uint64_t id = 0;                              ///< follows it from view to view
     std::string state;                                 ///< of kRiftStateNames
     std::string reason;                                ///< one sentence, may be empty
     std::string type;                                  ///< kindNames()
     Eigen::Vector3f centre = Eigen::Vector3f::Zero();  ///< [m]
     Eigen::Vector3f normal = Eigen::Vector3f::Zero();
-    std::size_t openVertices = 0, edges = 0, attempts = 0;
+    std::size_t openVertices = 0, edges = 0;
+    std::size_t attempts = 0;  ///< views taken to close it
+    /// Longest side of the box around its cells [m], length of what is torn [m], area that is too
+    /// coarse [m^2], cells of the planner's summary; nothing where there was no planner.
+    std::optional<double> extent, rim, coarse;
+    std::optional<std::size_t> cells;
+    std::size_t firstView = 0, lastView = 0;     ///< that had it, from 0
+    std::vector<std::uint64_t> parents, joined;  ///< ids that it split off, that became part of it
 };
 
 /// Writes what a mapping run leaves behind into its run directory (doc/file_formats.md): steps.csv
@@ -70,6 +77,7 @@ class RunRecorder {
     const std::vector<StepRow>& rows() const { return rows_; }
 
  private:
+    void writeRifts(const std::vector<RiftRow>& rifts) const;
     void writeSummary(const PixelGraph& graph, const std::vector<RiftRow>& rifts,
                       const std::string& stopReason, const YamlMap& more) const;
 

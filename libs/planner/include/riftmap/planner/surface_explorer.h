@@ -12,6 +12,7 @@
 #include "riftmap/core/platform.h"
 #include "riftmap/core/view.h"
 #include "riftmap/graph/pixel_graph.h"
+#include "riftmap/planner/rift_tracker.h"
 #include "riftmap/planner/view_planner.h"
 
 namespace riftmap {
@@ -60,6 +61,8 @@ class SurfaceExplorer {
     /// "complete", "max_views", "max_metres", "max_seconds", "interrupted".
     const std::string& stopReason() const { return stopReason_; }
     const Knowledge& knowledge() const { return knowledge_; }
+    /// The rifts as of the last view or, when the run is over, as they ended.
+    const RiftTracker& rifts() const { return rifts_; }
     std::size_t views() const { return knowledge_.views(); }
     double pathLength() const { return pathLength_; }
 
@@ -77,6 +80,7 @@ class SurfaceExplorer {
     Record record_;
     OnStep onStep_;
     Knowledge knowledge_;
+    RiftTracker rifts_;
     std::string stopReason_;
     double pathLength_ = 0;
     double lastKnowledgeMs_ = 0;

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <array>
 #include <cstdint>
 #include <map>
 #include <vector>
@@ -60,6 +61,11 @@ class SurfaceSummary {
     /// Nothing if the cell holds no vertex.
     const SurfaceCell* find(std::uint64_t key) const;
     std::uint64_t keyOf(const Eigen::Vector3d& point) const;
+    /// Which cube a key names, counted from the origin along x, y and z; and its key.
+    static Eigen::Vector3i indexOf(std::uint64_t key);
+    static std::uint64_t keyAt(const Eigen::Vector3i& index);
+    /// Added to a cell's key: the keys of 13 of the 26 cells around it, those that are larger.
+    static std::array<std::uint64_t, 13> neighbourOffsets();
     std::size_t cellCount() const;
 
  private:
