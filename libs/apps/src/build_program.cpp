@@ -163,6 +163,7 @@ class BuildProgram::Run {
         if (taken_.size() == 1) {
             afterFirstView(view, row);
         }
+        row.seconds = recorder_.seconds();
         recorder_.step(graph(), row);
         if (simplemap_) {
             simplemap_->add(observation);

@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "riftmap/apps/explore_program.h"
 
+#include <cstdio>
+
+#include "explore_record.h"
 #include "explore_run.h"
 #include "riftmap/apps/interrupt.h"
+#include "riftmap/core/file.h"
 
 namespace riftmap {
 
@@ -44,23 +48,45 @@ void ExploreProgram::describe(OptionTable& table) {
 
 void ExploreProgram::arguments(CommandLine& line) {
     line.value("resume", 0, "DIR", resume_,
-               "Go on with an interrupted run there (same configuration)");
+               "go on with the interrupted run there, with its own configuration if none is given");
+}
+
+std::filesystem::path ExploreProgram::defaultConfiguration() const {
+    return resume_.empty() ? resume_ : RunDirectory::resume(resume_).file("config_used.ini");
+}
+
+RunDirectory ExploreProgram::freshDirectory() {
+    std::vector<std::filesystem::path> inputs;
+    if (!simulation_.world.mesh.empty()) {
+        inputs.emplace_back(simulation_.world.mesh);
+    }
+    return makeRunDirectory(inputs);
 }
 
 void ExploreProgram::run() {
-    RunInfo info;
-    info.program = name();
-    info.command = commandText();
-    info.config = table().dump();
-    info.seed = seed();
-    info.threads = threads();
-    if (!simulation_.world.mesh.empty()) {
-        info.inputs.emplace_back(simulation_.world.mesh);
-    }
     planner_.seed = seed();
-    RunDirectory directory(resume_.empty() ? requiredOut() : resume_, info,
-                           overwrite() || !resume_.empty());
-    ExploreRun run(*this, directory);
+    if (resume_.empty()) {
+        RunDirectory directory = freshDirectory();
+        explore(directory);
+        return;
+    }
+    RunDirectory directory = RunDirectory::resume(resume_);
+    const std::string config = table().dump();
+    checkSameConfiguration(directory, config);
+    if (const auto reason = howItEnded(directory, config)) {
+        stopReason = *reason;
+        std::printf("%s: has ended (%s), there is nothing to go on with\n",
+                    directory.path().c_str(), reason->c_str());
+        return;
+    }
+    // From here on it is the directory of a run that has not ended.
+    std::filesystem::remove(directory.file("summary.yaml"));
+    writeAtomically(directory.file("config_used.ini"), [&](std::ostream& o) { o << config; });
+    explore(directory);
+}
+
+void ExploreProgram::explore(RunDirectory& directory) {
+    ExploreRun run(*this, directory, !resume_.empty());
     const InterruptGuard interrupt;
     run.run(interrupt.requested());
 }

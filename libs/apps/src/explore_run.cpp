@@ -81,13 +81,12 @@ class BaselinePlanner : public ViewPlanner {
 
 }  // namespace
 
-ExploreRun::ExploreRun(ExploreProgram& program, RunDirectory& directory)
+ExploreRun::ExploreRun(ExploreProgram& program, RunDirectory& directory, bool resumed)
     : program_(program),
       directory_(directory),
       platform_(makePlatform(program.simulation_, program.seed())),
       map_(program.graph_, program.stereo_),
-      builder_(program.stereo_),
-      recorder_(directory, program.explore_.judge) {
+      builder_(program.stereo_) {
     PlannerOptions options = program.planner_;
     if (program.explore_.knownBox) {
         target_ = boxAround(platform_->world().mesh);
@@ -100,22 +99,28 @@ ExploreRun::ExploreRun(ExploreProgram& program, RunDirectory& directory)
     }
     planner_ = makePlanner();
     if (program.explore_.judge) {
-        program.eval_.resolveCache();
-        const ViewSpace space =
-            viewSpaceOf(platform_->limits(), platform_->camera(), platform_->pose().translation);
-        judge_ = std::make_unique<CoverageJudge>(platform_->world().mesh, platform_->rayCaster(),
-                                                 space, program.eval_);
-        tracker_ = std::make_unique<CoverageTracker>(*judge_);
+        makeJudge();
+    }
+    if (resumed) {
+        record_ = salvageRecord(directory, program.explore_.rawlog,
+                                judge_ ? judge_->deltas() : std::vector<double>());
+    }
+    const auto mode = resumed ? CsvWriter::Mode::kAppend : CsvWriter::Mode::kNew;
+    recorder_ =
+        std::make_unique<RunRecorder>(directory, program.explore_.judge, mode, record_.seconds());
+    replay_ = std::make_unique<ReplayingPlatform>(*platform_, directory, record_.observations);
+    if (judge_) {
         std::vector<std::string> names = {"view", "path_length_m", "expected_gain_m2"};
         for (const double delta : judge_->deltas()) {
             names.push_back("c_obs_" + deltaName(delta));
             names.push_back("c_all_" + deltaName(delta));
         }
-        curve_ = std::make_unique<CsvWriter>(directory.file("coverage.csv"), names);
+        curve_ = std::make_unique<CsvWriter>(directory.file("coverage.csv"), names, mode);
     }
     if (program.explore_.rawlog) {
-        rawlog_ = std::make_unique<RawlogWriter>(directory.file("run.rawlog"),
-                                                 RawlogWriter::Images::kExternal);
+        rawlog_ = std::make_unique<RawlogWriter>(
+            directory.file("run.rawlog"), RawlogWriter::Images::kExternal,
+            resumed ? RawlogWriter::Mode::kAppend : RawlogWriter::Mode::kNew);
         // riftmap-build config_build.ini run.rawlog makes the same map of it.
         OptionTable build;
         program.stereo_.describe(build);
@@ -124,14 +129,26 @@ ExploreRun::ExploreRun(ExploreProgram& program, RunDirectory& directory)
                         [&](std::ostream& out) { out << build.dump(); });
     }
     explorer_ = std::make_unique<SurfaceExplorer>(
-        *platform_, graph(), *planner_, options, program.stop_,
+        *replay_, graph(), *planner_, options, program.stop_,
         [this](const StereoObservation& o) { return builder_.build(o); },
-        [this](StereoObservation& o) {
-            if (rawlog_) {
-                o.world_T_camera = rawlog_->write(o);
-            }
-        },
+        [this](StereoObservation& o) { record(o); },
         [this](const ExploreStep& step, const Knowledge& k) { onStep(step, k); });
+}
+
+void ExploreRun::makeJudge() {
+    program_.eval_.resolveCache();
+    const ViewSpace space =
+        viewSpaceOf(platform_->limits(), platform_->camera(), platform_->pose().translation);
+    judge_ = std::make_unique<CoverageJudge>(platform_->world().mesh, platform_->rayCaster(), space,
+                                             program_.eval_);
+    tracker_ = std::make_unique<CoverageTracker>(*judge_);
+}
+
+/// Into the rawlog with it; the map is made of what a reader will see.
+void ExploreRun::record(StereoObservation& observation) {
+    if (rawlog_ && !replay_->replayed()) {
+        observation.world_T_camera = rawlog_->write(observation);
+    }
 }
 
 std::unique_ptr<ViewPlanner> ExploreRun::makePlanner() {
@@ -189,7 +206,35 @@ std::vector<Coverage> ExploreRun::coverageNow() {
     return tracker_->update(points_);
 }
 
-void ExploreRun::onStep(const ExploreStep& step, const Knowledge& knowledge) {
+/// As recorded, or measured now and written down. With the digits of the file in both cases, so
+/// that what is made of them does not tell a resumed run from another.
+std::vector<Coverage> ExploreRun::coverageAfter(const ExploreStep& step) {
+    if (step.view < record_.coverage.size()) {
+        return record_.coverage[step.view];
+    }
+    std::vector<Coverage> coverage = coverageNow();
+    std::vector<Field> fields = {step.view, step.pathLength, step.gain};
+    for (Coverage& c : coverage) {
+        fields.emplace_back(c.cObs);
+        c.cObs = std::stod(fields.back().text());
+        fields.emplace_back(c.cAll);
+        c.cAll = std::stod(fields.back().text());
+    }
+    curve_->row(fields);
+    return coverage;
+}
+
+void ExploreRun::onStep(const ExploreStep& measured, const Knowledge& knowledge) {
+    const bool known = measured.view < record_.rows.size();
+    ExploreStep step = measured;
+    if (known) {  // the times of then
+        const StepRow& then = record_.rows[step.view];
+        step.stereoMs = then.stereoMs;
+        step.mergeMs = then.mergeMs;
+        step.riftsMs = then.riftsMs;
+        step.planMs = then.planMs;
+        step.seconds = then.seconds;
+    }
     taken_.push_back(step.input->world_T_camera);
     if (program_.explore_.planner != ExploreOptions::Planner::kRiftmap) {
         cloud_ = cloudOf(*step.input);
@@ -205,26 +250,31 @@ void ExploreRun::onStep(const ExploreStep& step, const Knowledge& knowledge) {
     row.mergeMs = step.mergeMs;
     row.riftsMs = step.riftsMs;
     row.planMs = step.planMs;
+    row.seconds = step.seconds;
     if (judge_) {
-        figures.coverage = coverageNow();
-        std::vector<Field> fields = {step.view, step.pathLength, step.gain};
-        for (const Coverage& c : figures.coverage) {
-            fields.emplace_back(c.cObs);
-            fields.emplace_back(c.cAll);
-        }
-        curve_->row(fields);
+        figures.coverage = coverageAfter(step);
         row.coverage = figures.coverage[headlineIndex()].cObs;
     }
-    recorder_.step(graph(), row);
     history_.push_back(std::move(figures));
-    if (program_.explore_.pictureEvery > 0 &&
-        history_.size() % static_cast<std::size_t>(program_.explore_.pictureEvery) == 0) {
-        collectVertices();
-        writePicture(directory_.file("map_" + std::to_string(history_.size()) + ".png"),
-                     cutawayPicture(points_, normals_, colours_, taken_));
+    if (known) {
+        recorder_->stepAgain(row);
+    } else {
+        recorder_->step(graph(), row);
     }
+    writePictureOfView(history_.size());
     if (program_.progress()) {
         showProgress(step, knowledge);
+    }
+}
+
+/// Every so many views, if that was asked for and it is not there yet.
+void ExploreRun::writePictureOfView(std::size_t number) {
+    const auto every = static_cast<std::size_t>(program_.explore_.pictureEvery);
+    const auto file = directory_.file("map_" + std::to_string(number) + ".png");
+    const bool isThere = number <= record_.rows.size() && std::filesystem::exists(file);
+    if (every > 0 && number % every == 0 && !isThere) {
+        collectVertices();
+        writePicture(file, cutawayPicture(points_, normals_, colours_, taken_));
     }
 }
 
@@ -248,10 +298,17 @@ void ExploreRun::showProgress(const ExploreStep& step, const Knowledge& knowledg
 
 void ExploreRun::run(const std::atomic<bool>& interrupt) {
     try {
-        explorer_->run(interrupt);
+        explorer_->run(interrupt, record_.seconds());
     } catch (const CollisionError& e) {
         finish(e.what());
         throw;
+    }
+    if (explorer_->stopReason() == "interrupted" && replay_->replays()) {
+        program_.stopReason = explorer_->stopReason();
+        std::cerr << directory_.path().string()
+                  << ": interrupted before there was a new view; nothing is changed\n";
+        rawlog_->finish();
+        return;
     }
     finish({});
 }
@@ -268,7 +325,7 @@ void ExploreRun::finish(const std::string& error) {
     SceneExtras scene;
     scene.taken = taken_;
     const YamlMap more = figures(error);
-    recorder_.finish(map_, certificate(), scene, program_.stopReason, more);
+    recorder_->finish(map_, certificate(), scene, program_.stopReason, more);
     writeCells();
     writePicture(directory_.file("map.png"), cutawayPicture(points_, normals_, colours_, taken_));
     writeReport();

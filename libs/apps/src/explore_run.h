@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "explore_record.h"
 #include "riftmap/apps/explore_program.h"
 #include "riftmap/apps/rawlog_writer.h"
 #include "riftmap/apps/run_recorder.h"
@@ -22,9 +23,12 @@ namespace riftmap {
 
 class ExploreRun {
  public:
-    ExploreRun(ExploreProgram& program, RunDirectory& directory);
+    /// `resumed`: the directory is that of an interrupted run. Its views are taken from there, with
+    /// the figures and times measured then.
+    ExploreRun(ExploreProgram& program, RunDirectory& directory, bool resumed);
 
-    /// To the end, or to the interrupt; a collision is written down and thrown again.
+    /// To the end, or to the interrupt; a collision is written down and thrown again. Who is
+    /// interrupted before there is a new view leaves the directory as it was.
     void run(const std::atomic<bool>& interrupt);
 
  private:
@@ -34,6 +38,9 @@ class ExploreRun {
         std::size_t open = 0;
     };
 
+    void makeJudge();
+    void record(StereoObservation& observation);
+    std::vector<Coverage> coverageAfter(const ExploreStep& step);
     void onStep(const ExploreStep& step, const Knowledge& knowledge);
     std::unique_ptr<ViewPlanner> makePlanner();
     std::vector<RiftRow> certificate() const;
@@ -42,6 +49,7 @@ class ExploreRun {
     void showProgress(const ExploreStep& step, const Knowledge& knowledge) const;
     void finish(const std::string& error);
     void writeReport() const;
+    void writePictureOfView(std::size_t number);
     void collectVertices();
     std::vector<Coverage> coverageNow();
     std::size_t headlineIndex() const;
@@ -53,7 +61,9 @@ class ExploreRun {
     std::unique_ptr<SimulatedPlatform> platform_;
     PixelGraphMap map_;
     ViewBuilder builder_;
-    RunRecorder recorder_;
+    ExploreRecord record_;  ///< of the run that this one goes on with; else empty
+    std::unique_ptr<RunRecorder> recorder_;
+    std::unique_ptr<ReplayingPlatform> replay_;
     Eigen::AlignedBox3d target_;  ///< box of an object that stands alone; else empty
     std::unique_ptr<CoverageJudge> judge_;
     std::unique_ptr<CoverageTracker> tracker_;

@@ -98,10 +98,14 @@ void Program::declareCommonFlags() {
 }
 
 /// The files may also hold sections of other programs, which are checked all the same: what one
-/// program was run with, another one judges or plays back with.
-void Program::loadConfiguration() {
-    if (line_.configFiles().empty()) {
-        return;
+/// program was run with, another one judges or plays back with. False if there is no file.
+bool Program::loadConfiguration() {
+    auto files = line_.configFiles();
+    if (const auto file = defaultConfiguration(); files.empty() && !file.empty()) {
+        files.push_back(file.string());
+    }
+    if (files.empty()) {
+        return false;
     }
     const std::vector<std::unique_ptr<Program>> programs = allPrograms();
     std::vector<OptionTable*> others;
@@ -109,9 +113,10 @@ void Program::loadConfiguration() {
         program->declare();
         others.push_back(&program->table_);
     }
-    for (const auto& file : line_.configFiles()) {
+    for (const auto& file : files) {
         table_.load(file, others);
     }
+    return true;
 }
 
 bool Program::initialize(int argc, const char* const* argv) {
@@ -133,7 +138,7 @@ bool Program::initialize(const std::vector<std::string>& arguments) {
     }
     setMinLoggingLevel(verbosityFrom(verbosity_));
     loadPlugins();
-    loadConfiguration();
+    const bool configured = loadConfiguration();
     for (const auto& assignment : sets_) {
         table_.set(assignment);
     }
@@ -147,7 +152,7 @@ bool Program::initialize(const std::vector<std::string>& arguments) {
         print(table_.dump());
         return false;
     }
-    if (config_ == Config::kRequired && line_.configFiles().empty()) {
+    if (config_ == Config::kRequired && !configured) {
         throw ConfigError("missing argument CONFIG.ini; see --help");
     }
     line_.checkPositionals();

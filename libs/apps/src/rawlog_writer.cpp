@@ -34,6 +34,10 @@ mrpt::img::CImage copyOf(const cv::Mat& mat) {
     return mrpt::img::CImage(mat.isContinuous() ? mat : mat.clone(), mrpt::img::DEEP_COPY);
 }
 
+std::filesystem::path partOf(const std::filesystem::path& file) {
+    return file.string() + ".part";
+}
+
 /// Through the bytes of the file and back.
 template <class T>
 T asRead(const T& object) {
@@ -80,12 +84,17 @@ mrpt::obs::CObservationStereoImages::Ptr toMrpt(const StereoObservation& observa
 
 class RawlogWriter::Impl {
  public:
-    Impl(std::filesystem::path file, Images images)
-        : file_(std::move(file)), part_(file_.string() + ".part"), images_(images) {
+    Impl(std::filesystem::path file, Images images, Mode mode)
+        : file_(std::move(file)), part_(partOf(file_)), images_(images) {
         mrpt::img::CImage::DISABLE_JPEG_COMPRESSION(true);
-        std::string why;
-        if (!stream_.open(part_.string(), 1, why)) {
-            throw FileError(file_.string() + ": cannot be written: " + oneLine(why));
+        if (mode == Mode::kAppend && std::filesystem::exists(file_)) {
+            count_ = objectsIn(file_);
+            const std::filesystem::path copy = file_.string() + ".copy";  // no part of it is seen
+            std::filesystem::copy_file(file_, copy,
+                                       std::filesystem::copy_options::overwrite_existing);
+            std::filesystem::rename(copy, part_);
+        } else {
+            open(mrpt::io::OpenMode::TRUNCATE);
         }
         if (images_ == Images::kExternal) {
             folder_ = file_.parent_path() / (file_.stem().string() + "_Images");
@@ -102,6 +111,9 @@ class RawlogWriter::Impl {
     Impl& operator=(const Impl&) = delete;
 
     void put(const mrpt::serialization::CSerializable& object) {
+        if (!stream_.fileOpenCorrectly()) {
+            open(mrpt::io::OpenMode::APPEND);
+        }
         try {
             mrpt::serialization::archiveFrom(stream_) << object;
         } catch (const std::exception& e) {
@@ -120,14 +132,18 @@ class RawlogWriter::Impl {
         put(static_cast<const mrpt::serialization::CSerializable&>(pair));
     }
 
+    /// What is written so far gets to the disk. The compressor would keep a hundred views to
+    /// itself; a file of several compressed members is one file to all who read it.
+    void flush() {
+        stream_.close();
+    }
+
     void finish() {
         stream_.close();
-        RawlogObjects objects(part_);
-        while (objects.next()) {
-        }
-        if (objects.count() != count_) {
+        const std::size_t arrived = objectsIn(part_);
+        if (arrived != count_) {
             throw FileError(file_.string() + ": " + std::to_string(count_) + " objects written, " +
-                            std::to_string(objects.count()) + " arrived: is the disk full?");
+                            std::to_string(arrived) + " arrived: is the disk full?");
         }
         std::error_code error;
         std::filesystem::rename(part_, file_, error);
@@ -137,6 +153,20 @@ class RawlogWriter::Impl {
     }
 
  private:
+    static std::size_t objectsIn(const std::filesystem::path& file) {
+        RawlogObjects objects(file);
+        while (objects.next()) {
+        }
+        return objects.count();
+    }
+
+    void open(mrpt::io::OpenMode mode) {
+        std::string why;
+        if (!stream_.open(part_.string(), 1, why, mode)) {
+            throw FileError(file_.string() + ": cannot be written: " + oneLine(why));
+        }
+    }
+
     void moveOut(mrpt::img::CImage& image, const mrpt::obs::CObservationStereoImages& pair,
                  const char* side) const {
         if (image.isExternallyStored()) {
@@ -156,8 +186,8 @@ class RawlogWriter::Impl {
     std::size_t count_ = 0;
 };
 
-RawlogWriter::RawlogWriter(const std::filesystem::path& file, Images images)
-    : impl_(std::make_unique<Impl>(file, images)) {}
+RawlogWriter::RawlogWriter(const std::filesystem::path& file, Images images, Mode mode)
+    : impl_(std::make_unique<Impl>(file, images, mode)) {}
 RawlogWriter::~RawlogWriter() = default;
 
 void RawlogWriter::comment(std::int64_t time_ns, const std::string& text) {
@@ -175,18 +205,68 @@ void RawlogWriter::pair(mrpt::obs::CObservationStereoImages& observation) {
     impl_->put(observation);
 }
 
+void RawlogWriter::view(const mrpt::obs::CObservationRobotPose& pose,
+                        mrpt::obs::CObservationStereoImages& pair) {
+    impl_->put(pose);
+    impl_->put(pair);
+    impl_->flush();
+}
+
 Pose RawlogWriter::write(const StereoObservation& observation, const std::string& label) {
     const Pose robot_T_camera = forwardCamera();
     const auto pose =
         poseObservation(observation.time_ns, observation.world_T_camera * robot_T_camera.inverse());
     const auto pair = toMrpt(observation, robot_T_camera, label);
-    impl_->put(pose);
-    impl_->put(*pair);
+    view(pose, *pair);
     return fromMrpt(asRead(pose).pose.mean) * fromMrpt(mrpt::poses::CPose3D(pair->cameraPose));
 }
 
 void RawlogWriter::finish() {
     impl_->finish();
+}
+
+namespace {
+
+/// The whole views of a recording that may be cut, into another file; returns how many. Without
+/// any there is no other file.
+std::size_t copyViews(const std::filesystem::path& from, const std::filesystem::path& to) {
+    using mrpt::obs::CObservationRobotPose;
+    using mrpt::obs::CObservationStereoImages;
+    std::size_t views = 0;
+    RawlogWriter out(to);
+    try {
+        RawlogObjects in(from);
+        CObservationRobotPose::Ptr pose;
+        while (const auto object = in.next()) {
+            const auto pair = std::dynamic_pointer_cast<CObservationStereoImages>(object);
+            if (pair && pose) {
+                out.view(*pose, *pair);
+                ++views;
+            }
+            pose = std::dynamic_pointer_cast<CObservationRobotPose>(object);
+        }
+    } catch (const RawlogError&) {  // here it was cut
+    }
+    if (views > 0) {
+        out.finish();
+    }
+    return views;
+}
+
+}  // namespace
+
+std::size_t salvageRawlog(const std::filesystem::path& file) {
+    namespace fs = std::filesystem;
+    const fs::path part = partOf(file);
+    const fs::path whole = file.string() + ".whole";
+    const std::size_t views = copyViews(fs::exists(part) ? part : file, whole);
+    if (views > 0) {
+        fs::rename(whole, file);
+    } else {
+        fs::remove(file);
+    }
+    fs::remove(part);
+    return views;
 }
 
 }  // namespace riftmap

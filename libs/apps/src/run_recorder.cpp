@@ -24,6 +24,7 @@ std::vector<std::string> stepColumns(bool withCoverage) {
     if (withCoverage) {
         columns.emplace_back("coverage");
     }
+    columns.emplace_back("seconds");
     return columns;
 }
 
@@ -67,11 +68,14 @@ std::string kindNames(std::uint8_t kinds) {
     return names.empty() ? "closed" : names;
 }
 
-RunRecorder::RunRecorder(const RunDirectory& run, bool withCoverage)
+RunRecorder::RunRecorder(const RunDirectory& run, bool withCoverage, CsvWriter::Mode mode,
+                         double secondsBefore)
     : run_(run),
       withCoverage_(withCoverage),
-      steps_(run.file("steps.csv"), stepColumns(withCoverage)),
-      trajectory_(run.file("trajectory.tum")) {
+      secondsBefore_(secondsBefore),
+      steps_(run.file("steps.csv"), stepColumns(withCoverage), mode),
+      trajectory_(run.file("trajectory.tum"),
+                  mode == CsvWriter::Mode::kAppend ? std::ios::app : std::ios::trunc) {
     if (!trajectory_) {
         throw FileError(run.file("trajectory.tum").string() + ": cannot be written");
     }
@@ -87,12 +91,18 @@ void RunRecorder::step(const PixelGraph& graph, const StepRow& row) {
     if (withCoverage_) {
         fields.push_back(fieldOf(row.coverage));
     }
+    fields.emplace_back(row.seconds);
     steps_.row(fields);
     trajectory_ << tumLine({row.time_ns, row.world_T_camera}) << '\n' << std::flush;
     if (!trajectory_) {
         throw FileError(run_.file("trajectory.tum").string() + ": cannot be written");
     }
     rows_.push_back(row);
+}
+
+double RunRecorder::seconds() const {
+    const std::chrono::duration<double> now = std::chrono::steady_clock::now() - start_;
+    return secondsBefore_ + now.count();
 }
 
 void RunRecorder::finish(const PixelGraphMap& map, const std::vector<RiftRow>& rifts,
@@ -152,8 +162,7 @@ void RunRecorder::writeSummary(const PixelGraph& graph, const std::vector<RiftRo
     }
     summary.set("path_length_m", rows_.empty() ? 0.0 : rows_.back().pathLength);
     summary.set("stop_reason", stopReason);
-    const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - start_;
-    summary.set("wall_s", wall.count());
+    summary.set("wall_s", seconds());
     for (const auto& [name, member] :
          {std::pair{"stereo_ms", &StepRow::stereoMs}, std::pair{"merge_ms", &StepRow::mergeMs},
           std::pair{"rifts_ms", &StepRow::riftsMs}, std::pair{"plan_ms", &StepRow::planMs}}) {

@@ -143,9 +143,9 @@ void SurfaceExplorer::move(ViewPlan& plan) {
     pathLength_ += length;
 }
 
-void SurfaceExplorer::run(const std::atomic<bool>& interrupt) {
+void SurfaceExplorer::run(const std::atomic<bool>& interrupt, double secondsBefore) {
     const auto start = Clock::now();
-    clock_ = [start] { return msSince(start) / 1000.0; };
+    clock_ = [=] { return secondsBefore + msSince(start) / 1000.0; };
     look(std::nullopt, 0.0);
     while (!limitReached(clock_())) {
         if (interrupt) {

@@ -410,16 +410,21 @@ void SimulatedPlatform::setState(const State& state) {
 }
 
 StereoObservation SimulatedPlatform::grab() {
-    State& state = parts_->state;
+    const State& state = parts_->state;
     StereoObservation observation =
         observe(parts_->renderer, parts_->options.camera, parts_->options.noise, state.pose,
                 viewSeed(parts_->seed, state.views));
     observation.time_ns = state.time_ns;
     observation.left = parts_->rectified(observation.left);
     observation.right = parts_->rectified(observation.right);
+    skipView();
+    return observation;
+}
+
+void SimulatedPlatform::skipView() {
+    State& state = parts_->state;
     ++state.views;
     state.time_ns += std::llround(parts_->options.platform.viewSeconds * 1e9);
-    return observation;
 }
 
 std::unique_ptr<SimulatedPlatform> makePlatform(const SimulationOptions& options,

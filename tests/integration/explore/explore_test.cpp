@@ -2,7 +2,10 @@
 // riftmap-explore as its user runs it, on a small camera.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <map>
+#include <opencv2/imgcodecs.hpp>
+#include <sstream>
 
 #include "riftmap/apps/build_program.h"
 #include "riftmap/apps/explore_program.h"
@@ -166,6 +169,185 @@ TEST(Explore, aResumedRunEndsAsIfItHadNotBeenInterrupted) {
     for (const auto* name : {"graph.ply", "trajectory.tum", "rifts.csv", "rift_cells.csv"}) {
         EXPECT_EQ(readFile(folder / "whole" / name), readFile(folder / "cut" / name)) << name;
     }
+}
+
+/// Runs that were killed, and runs that go on with them.
+class ExploreResumed : public testing::Test {
+ protected:
+    static Arguments sculpture(const std::filesystem::path& out, const std::string& noise,
+                               int views, const std::string& judge = "true") {
+        return Arguments{kConfig + "explore-sculpture.ini",
+                         "--set",
+                         "Noise.level=" + noise,
+                         "--set",
+                         "Graph.target_resolution=0.04",
+                         "--set",
+                         "Graph.gamma=0.01",
+                         "--set",
+                         "Eval.deltas=0.02 0.04",
+                         "--set",
+                         "Eval.headline=0.04",
+                         "--set",
+                         "Eval.samples=2000",
+                         "--set",
+                         "Explore.picture_every=2",
+                         "--set",
+                         "Explore.judge=" + judge,
+                         "--set",
+                         "Stop.max_views=" + std::to_string(views),
+                         "--out",
+                         out.string()} +
+               kSmallCamera;
+    }
+    static Arguments resume(const std::filesystem::path& run, int views) {
+        return {"--resume", run.string(), "--set", "Stop.max_views=" + std::to_string(views),
+                "--no-progress"};
+    }
+    static void cutEnd(const std::filesystem::path& file, std::size_t bytes) {
+        std::filesystem::resize_file(file, std::filesystem::file_size(file) - bytes);
+    }
+    /// As a run looks that was killed while it wrote: no summary, and parts of lines and objects.
+    static void kill(const std::filesystem::path& run) {
+        for (const auto* name : {"summary.yaml", "graph.ply", "rifts.csv", "report.html"}) {
+            std::filesystem::remove(run / name);
+        }
+        std::filesystem::rename(run / "run.rawlog", run / "run.rawlog.part");
+        cutEnd(run / "run.rawlog.part", 100);
+        cutEnd(run / "steps.csv", 7);
+    }
+    /// Without the columns of measured times.
+    static std::string withoutTimes(const std::filesystem::path& file) {
+        const CsvTable table = readCsv(file);
+        std::string text;
+        for (const auto& row : table.rows) {
+            for (std::size_t i = 0; i < row.size(); ++i) {
+                const std::string& name = table.header[i];
+                text += name.ends_with("_ms") || name == "seconds" ? "" : row[i] + ",";
+            }
+            text += "\n";
+        }
+        return text;
+    }
+    static void expectSame(const std::filesystem::path& a, const std::filesystem::path& b) {
+        for (const auto* name :
+             {"graph.ply", "run.rawlog", "trajectory.tum", "rifts.csv", "rift_cells.csv",
+              "coverage.csv", "map.png", "map_2.png", "config_used.ini"}) {
+            if (std::filesystem::exists(a / name)) {
+                EXPECT_EQ(readFile(a / name), readFile(b / name)) << name;
+            }
+        }
+        EXPECT_EQ(withoutTimes(a / "steps.csv"), withoutTimes(b / "steps.csv"));
+        for (const auto* figure : {"auc_10: ", "path_to_90_m: ", "explained: ", "stop_reason: "}) {
+            EXPECT_EQ(lineWith(a / "summary.yaml", figure), lineWith(b / "summary.yaml", figure));
+        }
+    }
+    static std::string lineWith(const std::filesystem::path& file, const std::string& start) {
+        std::istringstream lines(readFile(file));
+        for (std::string line; std::getline(lines, line);) {
+            if (line.starts_with(start)) {
+                return line;
+            }
+        }
+        return "";
+    }
+    /// The first rows, times and all.
+    static std::string beginning(const std::filesystem::path& file, int lines) {
+        const std::string text = readFile(file);
+        std::size_t end = 0;
+        for (int i = 0; i < lines; ++i) {
+            end = text.find('\n', end) + 1;
+        }
+        return text.substr(0, end);
+    }
+
+    TemporaryFolder folder_;
+    std::filesystem::path whole_ = folder_ / "whole";
+    std::filesystem::path cut_ = folder_ / "cut";
+};
+
+TEST_F(ExploreResumed, aKilledRunGoesOnWithWhatItHasSeen) {
+    for (const std::string noise : {"N0", "N3", "N4"}) {
+        SCOPED_TRACE(noise);
+        const std::string judge = noise == "N3" ? "true" : "false";
+        const auto whole = whole_ / noise;
+        const auto cut = cut_ / noise;
+        ASSERT_EQ(explore(sculpture(whole, noise, 6, judge)), 0);
+        ASSERT_EQ(explore(sculpture(cut, noise, 4, judge)), 0);
+        kill(cut);
+        const std::string before = beginning(cut / "steps.csv", 4);  // the fourth view was cut
+        ASSERT_EQ(explore(resume(cut, 6)), 0);
+        expectSame(whole, cut);
+        EXPECT_EQ(beginning(cut / "steps.csv", 4), before) << "not the times of the first run";
+        EXPECT_EQ(readCsv(cut / "steps.csv").rows.size(), 6U);
+        EXPECT_FALSE(std::filesystem::exists(cut / "run.rawlog.part"));
+        BuildProgram build;
+        ASSERT_EQ(
+            runProgram(build, {(cut / "config_build.ini").string(), (cut / "run.rawlog").string(),
+                               "--out", (cut / "built").string(), "--no-progress"}),
+            0);
+        EXPECT_EQ(readFile(cut / "graph.ply"), readFile(cut / "built" / "graph.ply"));
+    }
+}
+
+/// A negative of the last pair matches as well, but its colours tell where the map is from.
+TEST_F(ExploreResumed, whatIsRecordedIsNotRenderedAgain) {
+    ASSERT_EQ(explore(sculpture(whole_, "N4", 3, "false")), 0);
+    ASSERT_EQ(explore(sculpture(cut_, "N4", 2, "false")), 0);
+    std::vector<std::string> images;
+    for (const auto& entry : std::filesystem::directory_iterator(cut_ / "run_Images")) {
+        images.push_back(entry.path().string());
+    }
+    ASSERT_EQ(images.size(), 4U);
+    std::sort(images.begin(), images.end());
+    for (const std::string& name : {images[2], images[3]}) {
+        cv::imwrite(name, 255 - cv::imread(name, cv::IMREAD_UNCHANGED));
+    }
+    ASSERT_EQ(explore(resume(cut_, 3)), 0);
+    EXPECT_NE(readFile(whole_ / "graph.ply"), readFile(cut_ / "graph.ply"));
+}
+
+TEST_F(ExploreResumed, aRunThatWasKilledBeforeItsFirstViewBegins) {
+    ASSERT_EQ(explore(sculpture(whole_, "N0", 2, "false")), 0);
+    ASSERT_EQ(explore(sculpture(cut_, "N0", 2, "false")), 0);
+    for (const auto* name : {"summary.yaml", "steps.csv", "trajectory.tum", "run.rawlog"}) {
+        std::filesystem::remove(cut_ / name);
+    }
+    ASSERT_EQ(explore(resume(cut_, 2)), 0);
+    expectSame(whole_, cut_);
+}
+
+TEST_F(ExploreResumed, aRunThatHasEndedIsLeftAlone) {
+    ASSERT_EQ(explore(sculpture(cut_, "N0", 2, "false")), 0);
+    const std::string before = readFile(cut_ / "summary.yaml");
+    testing::internal::CaptureStdout();
+    ASSERT_EQ(explore(resume(cut_, 2)), 0);
+    EXPECT_NE(testing::internal::GetCapturedStdout().find("has ended (max_views)"),
+              std::string::npos);
+    EXPECT_EQ(readFile(cut_ / "summary.yaml"), before);
+}
+
+TEST_F(ExploreResumed, whatCannotGoOnIsToldInOneLine) {
+    EXPECT_EQ(explore({"--resume", (folder_ / "nowhere").string()}), 2);
+    ASSERT_EQ(explore(sculpture(cut_, "N0", 3, "false")), 0);
+    kill(cut_);
+    const auto failure = [&](const Arguments& more) {
+        testing::internal::CaptureStderr();
+        const int code = explore(resume(cut_, 4) + more);
+        return std::to_string(code) + " " + testing::internal::GetCapturedStderr();
+    };
+    const std::string other = failure({"--set", "Planner.view_cost=1"});
+    EXPECT_EQ(other[0], '2') << other;
+    EXPECT_NE(other.find("Planner.view_cost"), std::string::npos) << other;
+    // A configuration that was tampered with stands for a version that plans otherwise.
+    std::string config = readFile(cut_ / "config_used.ini");
+    const std::string seed = "\nseed = 0";
+    ASSERT_NE(config.find(seed), std::string::npos);
+    config.replace(config.find(seed), seed.size(), "\nseed = 7");
+    folder_.write("cut/config_used.ini", config);
+    const std::string elsewhere = failure({});
+    EXPECT_EQ(elsewhere[0], '1') << elsewhere;
+    EXPECT_NE(elsewhere.find("is not from where this run would take it"), std::string::npos)
+        << elsewhere;
 }
 
 /// An object on its own, known to stand in a box: ends by itself and covers what can be seen.

@@ -34,7 +34,8 @@ class ExploreProgram : public Program {
  public:
     ExploreProgram();
 
-    /// Ctrl-C ends it after the view at work, with everything saved.
+    /// Ctrl-C ends it after the view at work, with everything saved. With --resume it goes on in
+    /// the directory of an interrupted run.
     void run() override;
 
     // What came out of it.
@@ -47,9 +48,13 @@ class ExploreProgram : public Program {
  protected:
     void describe(OptionTable& table) override;
     void arguments(CommandLine& line) override;
+    std::filesystem::path defaultConfiguration() const override;
 
  private:
     friend class ExploreRun;
+
+    RunDirectory freshDirectory();
+    void explore(RunDirectory& directory);
 
     SimulationOptions simulation_;
     StereoOptions stereo_;

@@ -59,6 +59,8 @@ class Program : public mrpt::system::COutputLogger {
     virtual void describe(OptionTable& table) = 0;
     /// Declares positional arguments and flags; none by default.
     virtual void arguments(CommandLine& line);
+    /// Configuration that is loaded where none is given on the command line; empty: none.
+    virtual std::filesystem::path defaultConfiguration() const { return {}; }
 
     // What the command line said; meaningful in run().
     /// Positional argument number i, without the INI files; empty if it was not given.
@@ -83,7 +85,7 @@ class Program : public mrpt::system::COutputLogger {
 
  private:
     void declare();
-    void loadConfiguration();
+    bool loadConfiguration();
     void declareCommonFlags();
     void loadPlugins();
     std::string usageText() const;

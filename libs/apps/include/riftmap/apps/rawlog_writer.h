@@ -2,6 +2,7 @@
 #pragma once
 
 #include <mrpt/obs/CObservation.h>
+#include <mrpt/obs/CObservationRobotPose.h>
 #include <mrpt/obs/CObservationStereoImages.h>
 
 #include <cstddef>
@@ -18,7 +19,8 @@ namespace riftmap {
 Pose forwardCamera();
 
 /// Writes a rawlog of observations in MRPT's own classes, so that every program of MRPT reads it.
-/// The file appears under its name when finish() is done. Not thread-safe.
+/// The file appears under its name when finish() is done, until then it is FILE.part. Not
+/// thread-safe.
 class RawlogWriter {
  public:
     enum class Images {
@@ -26,8 +28,14 @@ class RawlogWriter {
         kExternal,  ///< PNG files in NAME_Images beside NAME.rawlog
     };
 
-    /// Throws FileError where the file cannot be made.
-    explicit RawlogWriter(const std::filesystem::path& file, Images images = Images::kEmbedded);
+    enum class Mode {
+        kNew,
+        kAppend,  ///< goes on behind what is in FILE
+    };
+
+    /// Throws FileError where the file cannot be made (or read, to append).
+    explicit RawlogWriter(const std::filesystem::path& file, Images images = Images::kEmbedded,
+                          Mode mode = Mode::kNew);
     ~RawlogWriter();  ///< without finish(): nothing is left behind but images
     RawlogWriter(const RawlogWriter&) = delete;
     RawlogWriter& operator=(const RawlogWriter&) = delete;
@@ -39,9 +47,14 @@ class RawlogWriter {
     /// A pair as it is; its images may be moved out to files.
     void pair(mrpt::obs::CObservationStereoImages& observation);
 
+    /// Both, and to the disk with them, as write() says.
+    void view(const mrpt::obs::CObservationRobotPose& pose,
+              mrpt::obs::CObservationStereoImages& pair);
+
     /// Robot pose and rectified pair, the camera looking ahead on the robot. Returns the camera's
     /// pose as a reader will see it: angles and quaternions in the file cost the last bits, and
-    /// a map to be built again to the byte must be built from this one.
+    /// a map to be built again to the byte must be built from this one. The view is on its way to
+    /// the disk then: who is killed keeps it, see salvageRawlog().
     Pose write(const StereoObservation& observation, const std::string& label = "stereo");
 
     /// Closes the file, reads its end back (MRPT does not notice a full disk) and gives it its
@@ -52,6 +65,12 @@ class RawlogWriter {
     class Impl;
     std::unique_ptr<Impl> impl_;
 };
+
+/// Makes FILE of what a recording that was killed has left behind (FILE.part, or FILE itself): the
+/// views that are whole, as RawlogWriter::write() put them there. Returns how many; where there are
+/// none, or no file at all, there is no FILE afterwards. Throws FileError where it cannot be
+/// written.
+std::size_t salvageRawlog(const std::filesystem::path& file);
 
 /// A rectified pair as an MRPT observation: calibration, images (copied), time, label and the pose
 /// of the camera on the robot.

@@ -37,6 +37,7 @@ struct StepRow {
     double pathLength = 0;  ///< so far [m]
     double stereoMs = 0, mergeMs = 0, riftsMs = 0, planMs = 0;
     std::optional<double> coverage;  ///< 0 .. 1, where truth is known
+    double seconds = 0;              ///< since the run began
 };
 
 /// A row of rifts.csv, the certificate: what became of one connected tear. Map frame.
@@ -62,11 +63,16 @@ struct RiftRow {
 /// is written by finish(). Not thread-safe.
 class RunRecorder {
  public:
-    /// `withCoverage`: steps.csv has a column `coverage`. Throws FileError.
-    RunRecorder(const RunDirectory& run, bool withCoverage);
+    /// `withCoverage`: steps.csv has a column `coverage`. With kAppend the files go on behind what
+    /// an interrupted run, `secondsBefore` long, has left in them. Throws FileError.
+    RunRecorder(const RunDirectory& run, bool withCoverage,
+                CsvWriter::Mode mode = CsvWriter::Mode::kNew, double secondsBefore = 0);
 
     /// After a view was merged. Throws FileError.
     void step(const PixelGraph& graph, const StepRow& row);
+    /// A view whose row is there already.
+    void stepAgain(const StepRow& row) { rows_.push_back(row); }
+    double seconds() const;  ///< since the run began [s]
 
     /// Writes graph.ply, map.pixelgraph, scene.3Dscene, rifts.csv and summary.yaml. `more` goes to
     /// the end of the summary. Throws FileError.
@@ -83,6 +89,7 @@ class RunRecorder {
 
     RunDirectory run_;
     bool withCoverage_;
+    double secondsBefore_;
     CsvWriter steps_;
     std::ofstream trajectory_;
     std::vector<StepRow> rows_;

@@ -56,7 +56,8 @@ class SurfaceExplorer {
 
     /// Runs to the end; `interrupt` (e.g. set by a signal handler) ends it after the view at work.
     /// Throws CollisionError where the platform hits something; the map is complete up to there.
-    void run(const std::atomic<bool>& interrupt);
+    /// @param secondsBefore of running that count, too: of the run that this one goes on with
+    void run(const std::atomic<bool>& interrupt, double secondsBefore = 0);
 
     /// "complete", "max_views", "max_metres", "max_seconds", "interrupted".
     const std::string& stopReason() const { return stopReason_; }

@@ -94,6 +94,8 @@ class SimulatedPlatform : public CameraPlatform {
     /// As observe() tells; N4's pairs are rectified. The noise depends on the seed and the number
     /// of views before.
     StereoObservation grab() override;
+    /// Time and noise go on as if grab() had been called: what it would return is known.
+    void skipView();
 
     /// What decides the next observation: to go on from an earlier run.
     struct State {
