@@ -29,6 +29,8 @@ class Choice {
     std::optional<ViewPlan> make();
 
  private:
+    friend struct ChoiceTwin;  ///< of the tests
+
     double uniform(double a, double b) {
         return a + (b - a) * static_cast<double>(random_()) / 4294967296.0;
     }

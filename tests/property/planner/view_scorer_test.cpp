@@ -1,0 +1,246 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What a view is said to see, against every cell projected onto every other.
+#include "riftmap/planner/view_scorer.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "random_scene.h"
+
+namespace riftmap {
+namespace {
+
+/// The scorer's picture of a scene, and the same worked out cell by cell.
+struct Watched {
+    Watched(std::uint32_t seed, double cell, double resolution_)
+        : scene(seed),
+          graph(optionsFor(resolution_)),
+          summary(cell, resolution_),
+          ledger(resolution_, 3),
+          space(Eigen::AlignedBox3d(Eigen::Vector3d(-1, -4, -4), Eigen::Vector3d(3, 4, 4)), 0.1),
+          resolution(resolution_) {
+        PlatformLimits limits;
+        limits.nearLimit = 0.4;
+        limits.farLimit = 6;
+        for (const Pose& pose : {lookAt({0, 0, 0}, {1, 0, 0}), lookAt({0, 0.4, 0.2}, {2, 0, 0})}) {
+            const View view = scene.see(pose);
+            graph.merge(view);
+            summary.update(graph, view);
+            ledger.update(summary);
+            sensor = SensorModel::of(view, limits);
+            space.carve(view, sensor, false);
+        }
+    }
+    ViewScorer scorer(const ViewScorer::Weights& weights = {0.5}) const {
+        return {sensor, summary, ledger, space, resolution, weights};
+    }
+    Pose anyPose() {
+        return lookAt(scene.place({-0.5, -1.2, -1}, {1.4, 1.2, 1}),
+                      scene.place({1.5, -1, -1}, {3, 1, 1}));
+    }
+    static GraphOptions optionsFor(double target) {
+        GraphOptions options;
+        options.targetResolution = target;
+        return options;
+    }
+
+    test::RandomScene scene;
+    PixelGraph graph;
+    SurfaceSummary summary;
+    RiftLedger ledger;
+    FreeSpace space;
+    SensorModel sensor;
+    double resolution;
+};
+
+enum class Sight { kNo, kYes, kRounding };  // the last: single precision may go either way
+
+/// No buffer, no blocks: which cell's square hides the place of another in the image.
+class SlowSight {
+ public:
+    SlowSight(const Watched& watched, const Pose& world_T_camera)
+        : sensor_(watched.sensor),
+          camera_T_world_(world_T_camera.inverse()),
+          cell_(watched.summary.cellSize()) {
+        for (const auto& [key, block] : watched.summary.blocks()) {
+            for (const SurfaceCell& cell : block.cells) {
+                const Eigen::Vector3d p =
+                    camera_T_world_ * Eigen::Vector3d(cell.position.cast<double>());
+                if (p.z() > 0.05 && p.z() < sensor_.farLimit) {
+                    squares_.push_back(p);
+                }
+            }
+        }
+    }
+
+    Sight of(const SurfaceCell& cell) const {
+        const Eigen::Vector3d p =
+            camera_T_world_ * Eigen::Vector3d(cell.openPosition.cast<double>());
+        const double least = 1.02 * sensor_.nearLimit;
+        const StereoCamera& c = sensor_.camera;
+        const Eigen::Vector2d uv = c.project(p);
+        const double inside = std::min(
+            {p.z() - least, sensor_.farLimit - p.z(), uv.x() - sensor_.firstColumn - kMargin,
+             c.width - 1 - kMargin - uv.x(), uv.y() - kMargin, c.height - 1 - kMargin - uv.y()});
+        if (inside < -kDoubt || p.z() <= 0) {
+            return Sight::kNo;
+        }
+        const double column = uv.x() / kPixels;
+        const double row = uv.y() / kPixels;
+        bool doubt = inside < kDoubt || nearWhole(column) || nearWhole(row);
+        for (const Eigen::Vector3d& square : squares_) {
+            const double before = p.z() - 2 * cell_ - square.z();
+            const Sight covers = hides(square, std::floor(column), std::floor(row));
+            if (before > kDoubt && covers == Sight::kYes && !doubt) {
+                return Sight::kNo;
+            }
+            doubt = doubt || (before > -kDoubt && covers != Sight::kNo &&
+                              (before < kDoubt || covers == Sight::kRounding));
+        }
+        return doubt ? Sight::kRounding : Sight::kYes;
+    }
+
+ private:
+    static constexpr double kPixels = 12;   // of the image to one of the scorer's
+    static constexpr double kMargin = 6;    // [px] at the border nothing is seen
+    static constexpr double kDoubt = 2e-3;  // [px], [m]
+
+    static bool nearWhole(double x) { return std::abs(x - std::round(x)) < kDoubt; }
+
+    /// Whether the square of a cell, 1.2 cells wide, reaches over the middle of a pixel.
+    Sight hides(const Eigen::Vector3d& square, double column, double row) const {
+        const StereoCamera& c = sensor_.camera;
+        const double half = c.fx / kPixels * 0.6 * cell_ / square.z();
+        const double u = c.fx / kPixels * square.x() / square.z() + (c.cx + 0.5) / kPixels - 0.5;
+        const double v = c.fy / kPixels * square.y() / square.z() + (c.cy + 0.5) / kPixels - 0.5;
+        // Ends count to the pixel that they are in, so half a pixel more.
+        const double over = half + 0.5 - std::max(std::abs(u - column), std::abs(v - row));
+        return over < -kDoubt ? Sight::kNo : over > kDoubt ? Sight::kYes : Sight::kRounding;
+    }
+
+    SensorModel sensor_;
+    Pose camera_T_world_;
+    double cell_;
+    std::vector<Eigen::Vector3d> squares_;
+};
+
+class ScorerTwin : public testing::TestWithParam<std::uint32_t> {};
+
+TEST_P(ScorerTwin, seesTheCellsThatNothingHides) {
+    SCOPED_TRACE("seed " + std::to_string(GetParam()));
+    Watched watched(GetParam(), 0.08, 0.02);
+    const ViewScorer scorer = watched.scorer();
+    std::size_t seen = 0;
+    std::size_t hidden = 0;
+    std::size_t doubtful = 0;
+    for (int i = 0; i < 12; ++i) {
+        const Pose pose = watched.anyPose();
+        const ViewScore score = scorer.score(pose);
+        const SlowSight slow(watched, pose);
+        double sure = 0;
+        double possible = 0;
+        for (const RiftRecord* record : scorer.open()) {
+            const ViewScorer::Benefit b = scorer.benefit(*record, pose.translation);
+            const Sight sight = slow.of(record->cell);
+            seen += sight == Sight::kYes ? 1 : 0;
+            hidden += sight == Sight::kNo ? 1 : 0;
+            doubtful += sight == Sight::kRounding ? 1 : 0;
+            sure += sight == Sight::kYes ? b.area : 0.0;
+            possible += sight != Sight::kNo ? b.area : 0.0;
+            const bool well = b.area > 0 && b.quality > 0.5;
+            if (sight != Sight::kRounding) {
+                EXPECT_EQ(
+                    std::binary_search(score.cells.begin(), score.cells.end(), record->cell.key),
+                    well && sight == Sight::kYes)
+                    << record->cell.openPosition.transpose();
+            }
+        }
+        EXPECT_GE(score.openGain, sure - 1e-9);
+        EXPECT_LE(score.openGain, possible + 1e-9);
+        // With so few cells the estimate leaves none out.
+        EXPECT_EQ(scorer.estimate(pose).openGain, score.openGain);
+        EXPECT_EQ(scorer.estimate(pose).cells, score.cells);
+    }
+    EXPECT_FALSE(scorer.samples());
+    EXPECT_GT(seen, 500U);
+    EXPECT_GT(hidden, 500U);
+    EXPECT_LT(doubtful, (seen + hidden) / 10);
+}
+
+/// Beyond 6000 open cells the estimate takes every n-th: the sum over those, n times, and not
+/// farther from the whole than a sample of so many may be.
+TEST_P(ScorerTwin, anEstimateIsTheSumOfASample) {
+    SCOPED_TRACE("seed " + std::to_string(GetParam()));
+    Watched watched(GetParam(), 0.02, 0.005);
+    const ViewScorer scorer = watched.scorer();
+    ASSERT_TRUE(scorer.samples()) << scorer.open().size();
+    const std::size_t stride = (scorer.open().size() + 5999) / 6000;
+    ASSERT_GT(stride, 1U);
+    for (int i = 0; i < 4; ++i) {
+        const Pose pose = watched.anyPose();
+        const ViewScore score = scorer.score(pose);
+        const ViewScore estimate = scorer.estimate(pose);
+        const SlowSight slow(watched, pose);
+        double sure = 0;
+        double possible = 0;
+        double squares = 0;
+        for (std::size_t k = 0; k < scorer.open().size(); ++k) {
+            const double area = scorer.benefit(*scorer.open()[k], pose.translation).area;
+            if (area <= 0) {
+                continue;
+            }
+            const Sight sight = slow.of(scorer.open()[k]->cell);
+            squares += sight != Sight::kNo ? area * area : 0.0;
+            if (k % stride == 0) {
+                const auto n = static_cast<double>(stride);
+                sure += sight == Sight::kYes ? n * area : 0.0;
+                possible += sight != Sight::kNo ? n * area : 0.0;
+            }
+        }
+        EXPECT_GE(estimate.openGain, sure - 1e-9);
+        EXPECT_LE(estimate.openGain, possible + 1e-9);
+        const double deviation = std::sqrt(static_cast<double>(stride - 1) * squares);
+        EXPECT_NEAR(estimate.openGain, score.openGain, 4 * deviation + 1e-9);
+    }
+}
+
+/// doc/explorer.md: nothing below two resolutions, 0.3 cells from eight on, between them straight.
+TEST_P(ScorerTwin, aTearIsWorthItsLengthTimesWhatItsStepHides) {
+    SCOPED_TRACE("seed " + std::to_string(GetParam()));
+    constexpr double kCell = 0.08;
+    constexpr double kResolution = 0.02;
+    const Watched watched(GetParam(), kCell, kResolution);
+    ViewScorer::Weights weights{0.5};
+    weights.reach = 0.3;
+    const ViewScorer scorer = watched.scorer(weights);
+    const std::vector<float> worth = scorer.worth();
+    ASSERT_EQ(worth.size(), 2 * scorer.open().size());
+    std::array<int, 3> met{};
+    for (std::size_t i = 0; i < scorer.open().size(); ++i) {
+        const SurfaceCell& cell = scorer.open()[i]->cell;
+        const auto jump = static_cast<double>(cell.jump);
+        double width = 0;
+        if (jump >= 8 * kResolution) {
+            ++met[2];
+            width = 0.3 * kCell;
+        } else if (jump > 2 * kResolution) {
+            ++met[1];
+            width = 0.3 * kCell * (jump - 2 * kResolution) / (6 * kResolution);
+        } else {
+            ++met[0];
+        }
+        const double least = 0.02 * 0.3 * kCell;  // so that it is not forgotten altogether
+        EXPECT_NEAR(worth[2 * i], static_cast<double>(cell.rim) * std::max(width, least), 1e-7);
+        EXPECT_EQ(worth[2 * i + 1], cell.doubt);
+    }
+    EXPECT_GT(met[0], 0);
+    EXPECT_GT(met[1], 0);
+    EXPECT_GT(met[2], 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(Seeds, ScorerTwin, testing::Range(1U, 6U));
+
+}  // namespace
+}  // namespace riftmap
