@@ -207,11 +207,7 @@ void Association::placeEntries(const ViewPoints& view, int strip, std::size_t be
     forEachCandidateOn(first, end, view.width, [&](std::size_t k) {
         const std::uint32_t at = --start_[pixelOf_[k] + pixelOf_[k] / w];
         const float noise = kNoiseGate * sigma_[k];
-        entryU_[at] = u_[k];
-        entryV_[at] = v_[k];
-        entryZ_[at] = z_[k];
-        entryNoise_[at] = noise * noise;
-        entryCandidate_[at] = static_cast<std::int32_t>(k);
+        entries_[at] = {u_[k], v_[k], z_[k], noise * noise, static_cast<std::int32_t>(k)};
     });
 }
 
@@ -226,11 +222,7 @@ void Association::sortByPixel(const ViewPoints& view) {
     for (std::size_t s = 0; s < strips_.size(); ++s) {
         before[s + 1] = before[s] + strips_[s].entries;
     }
-    constexpr std::size_t kPadding = 64;  // the kernel reads whole vectors
-    for (auto* values : {&entryU_, &entryV_, &entryZ_, &entryNoise_}) {
-        values->resize(before.back() + kPadding);
-    }
-    entryCandidate_.resize(before.back() + kPadding);
+    entries_.resize(before.back());
     parallelFor(strips_.size(), 1, [&](std::size_t strip, std::size_t) {
         placeEntries(view, static_cast<int>(strip), before[strip]);
     });
@@ -253,14 +245,14 @@ void Association::matchByDistance(const ViewPoints& view, float gamma, int row, 
         for (int r = std::max(0, row - radius); r <= std::min(view.height - 1, row + radius); ++r) {
             const std::uint32_t* start = &start_[view.index(0, r) + static_cast<std::size_t>(r)];
             for (std::uint32_t e = start[first]; e < start[last + 1]; ++e) {
-                const float z = entryZ_[e];
-                const Eigen::Vector3f other((entryU_[e] - view.cx) * z / view.fx,
-                                            (entryV_[e] - view.cy) * z / view.fy, z);
+                const auto& [u, v, z, noise, candidate] = entries_[e];
+                const Eigen::Vector3f other((u - view.cx) * z / view.fx,
+                                            (v - view.cy) * z / view.fy, z);
                 const float squared = (other - point).squaredNorm();
-                if (squared < least || (squared == least && found[column] >= 0 &&
-                                        entryCandidate_[e] < found[column])) {
+                if (squared < least ||
+                    (squared == least && found[column] >= 0 && candidate < found[column])) {
                     least = squared;
-                    found[column] = entryCandidate_[e];
+                    found[column] = candidate;
                 }
             }
         }
@@ -297,9 +289,8 @@ void Association::matchStrip(const ViewPoints& view, const GraphOptions& options
         if (options.fusion == GraphOptions::Fusion::kFirst) {
             matchByDistance(view, gamma, r, strip.distance.data(), strip.found.data());
         } else {
-            matchRow({entryU_.data(), entryV_.data(), entryZ_.data(), entryNoise_.data(),
-                      entryCandidate_.data(), start_.data(), view.width, view.height, r,
-                      view.footprint, gamma, &view.z[line], &view.sigma[line], &view.stretch[line],
+            matchRow({entries_.data(), start_.data(), view.width, view.height, r, view.footprint,
+                      gamma, &view.z[line], &view.sigma[line], &view.stretch[line],
                       strip.distance.data(), strip.found.data()});
         }
         for (std::size_t c = 0; c < strip.found.size(); ++c) {
@@ -343,8 +334,7 @@ std::size_t Association::memoryBytes() const {
     std::size_t bytes = bytesOf(pages) + bytesOf(matchOf) + bytesOf(claims) + bytesOf(ownReach_) +
                         bytesOf(reach_) + bytesOf(u_) + bytesOf(v_) + bytesOf(z_) +
                         bytesOf(sigma_) + bytesOf(pixelOf_) + bytesOf(inView_) + bytesOf(rowsOf_) +
-                        bytesOf(entryU_) + bytesOf(entryV_) + bytesOf(entryZ_) +
-                        bytesOf(entryNoise_) + bytesOf(entryCandidate_) + bytesOf(start_);
+                        bytesOf(entries_) + bytesOf(start_);
     for (const Strip& strip : strips_) {
         bytes += bytesOf(strip.foreign) + bytesOf(strip.distance) + bytesOf(strip.found);
     }

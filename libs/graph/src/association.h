@@ -132,8 +132,7 @@ class Association {
 
     // What matching needs of a candidate, in the order of pixels: neighbours in a row of the image
     // are neighbours in memory.
-    std::vector<float> entryU_, entryV_, entryZ_, entryNoise_;  ///< noise: (kNoiseGate sigma)^2
-    std::vector<std::int32_t> entryCandidate_;
+    std::vector<MatchEntry> entries_;
     std::vector<std::uint32_t> start_;  ///< MatchRow::start
 };
 

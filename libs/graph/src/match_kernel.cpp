@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "match_kernel.h"
 
+#include <algorithm>
 #include <cstddef>
 #include <limits>
 
@@ -9,119 +10,132 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
+#include "vector_tail-inl.h"
+
 HWY_BEFORE_NAMESPACE();
 namespace riftmap::HWY_NAMESPACE {
 namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
+// Neighbours look at much the same entries: eight pixels at the ten columns around them.
+using D = hn::CappedTag<float, 8>;
+using DI = hn::Rebind<std::int32_t, D>;
+using V = hn::Vec<D>;
+using VI = hn::Vec<DI>;
+using M = hn::Mask<D>;
+constexpr D d;
+constexpr DI di;
 
-/// The search of one pixel; the best of each lane until the end.
-template <class D, class DI>
+HWY_INLINE V set(float x) {
+    return hn::Set(d, x);
+}
+HWY_INLINE int lanes() {
+    return static_cast<int>(hn::Lanes(d));
+}
+
+/// The search of a vector of pixels, one a lane.
 class Search {
  public:
-    using V = hn::Vec<D>;
-    using VI = hn::Vec<DI>;
+    HWY_INLINE Search(const MatchRow& in, int first) : in_(in), first_(first) {
+        const int left = in.width - first;
+        const V depth = loadSome(d, in.depth + first, left);
+        const V deviation = loadSome(d, in.sigma + first, left);
+        const V stretch = loadSome(d, in.stretch + first, left);
+        const V gamma = set(in.gamma), one = set(1.0F);
+        there_ = hn::Gt(depth, hn::Zero(d));
+        // gateOf
+        const V perPixel = hn::IfThenElse(there_, hn::Mul(depth, set(in.footprint)), one);
+        const V blur = hn::Mul(set(kBlur), perPixel);
+        const V lateral = hn::Max(gamma, blur);
+        const V noise = hn::Mul(set(kNoiseGate), deviation);
+        const V along = hn::Max(hn::Max(gamma, noise), hn::Mul(blur, hn::Max(one, stretch)));
 
-    HWY_INLINE Search(const MatchRow& in, int column) : in_(in), column_(column) {
-        const float depth = in.depth[column];
-        const float perPixel = depth * in.footprint;
-        const Gate gate = gateOf(in.gamma, perPixel, in.sigma[column], in.stretch[column]);
-        const float pixels = perPixel / gate.lateral;
-        lateralScale_ = pixels * pixels;
-        radius_ = static_cast<int>(gate.lateral / perPixel + 0.5F) + 1;
-        x_ = hn::Set(d_, static_cast<float>(column));
-        y_ = hn::Set(d_, static_cast<float>(in.row));
-        z_ = hn::Set(d_, depth);
-        scale_ = hn::Set(d_, lateralScale_);
-        leastAlong_ = hn::Set(d_, gate.depth * gate.depth);
-        const float noise = kNoiseGate * in.sigma[column];
-        noise_ = hn::Set(d_, noise * noise);
-        best_ = hn::Set(d_, std::numeric_limits<float>::infinity());
-        who_ = hn::Set(di_, -1);
+        const V pixels = hn::Div(perPixel, lateral);
+        scale_ = hn::Mul(pixels, pixels);
+        const VI whole = hn::ConvertTo(di, hn::Add(hn::Div(lateral, perPixel), set(0.5F)));
+        const VI radius =
+            hn::Add(hn::Min(whole, hn::Set(di, in.width + in.height)), hn::Set(di, 1));
+        radius_ = hn::IfThenElseZero(hn::RebindMask(di, there_), radius);
+        x_ = hn::Add(set(static_cast<float>(first)), hn::Iota(d, 0));
+        y_ = set(static_cast<float>(in.row));
+        // Nothing is near to what is not there.
+        z_ = hn::IfThenElse(there_, depth, set(std::numeric_limits<float>::quiet_NaN()));
+        leastAlong_ = hn::Mul(along, along);
+        noise_ = hn::Mul(noise, noise);
+        best_ = set(std::numeric_limits<float>::infinity());
+        who_ = hn::Set(di, -1);
     }
 
-    /// Squares of growing size: a square's row of pixels is one run of entries, so the pixels
-    /// looked at again cost less than a ring's many pieces.
+    /// Squares of growing size, as long as some pixel may find a nearer entry farther off.
     HWY_INLINE void run() {
-        for (int half = 1;; half = half * 3 < radius_ ? half * 3 : radius_) {
+        if (hn::AllFalse(d, there_)) {
+            return;
+        }
+        for (int half = 1;;) {
             for (int r = in_.row - half; r <= in_.row + half; ++r) {
-                look(r, column_ - half, column_ + half);
+                look(r, first_ - half, first_ + lanes() - 1 + half);
             }
-            if (half >= radius_ || enough(half + 1)) {
+            const VI left = hn::IfThenElseZero(hn::RebindMask(di, unsure(half + 1)), radius_);
+            const int most = hn::GetLane(hn::MaxOfLanes(di, left));
+            if (most <= half) {
                 return;
             }
+            half = std::min(3 * half, most);
         }
     }
 
-    HWY_INLINE void result(float& distance, std::int32_t& found) const {
-        const V least = hn::MinOfLanes(d_, best_);
-        distance = hn::GetLane(least);
-        const VI last = hn::Set(di_, std::numeric_limits<std::int32_t>::max());
-        const auto isBest = hn::RebindMask(di_, hn::Eq(best_, least));
-        const std::int32_t who =
-            hn::GetLane(hn::MinOfLanes(di_, hn::IfThenElse(isBest, who_, last)));
-        found = distance < std::numeric_limits<float>::infinity() ? who : -1;
+    HWY_INLINE void store(float* distance, std::int32_t* found, int left) const {
+        storeSome(best_, d, distance, left);
+        storeSome(who_, di, found, left);
     }
 
  private:
-    /// Nothing `pixels` away or farther can be nearer than what was found.
-    HWY_INLINE bool enough(int pixels) const {
+    /// Where an entry `pixels` away may still be nearer than what was found.
+    HWY_INLINE M unsure(int pixels) const {
         const float nearest = static_cast<float>(pixels) - 0.5F;
-        const float least = hn::GetLane(hn::MinOfLanes(d_, best_));
-        return nearest * nearest * lateralScale_ > least;
+        return hn::Le(hn::Mul(set(nearest * nearest), scale_), best_);
     }
 
     /// Pixels [first, last] of a row of the image.
     HWY_INLINE void look(int r, int first, int last) {
-        first = first < 0 ? 0 : first;
-        last = last < in_.width ? last : in_.width - 1;
-        if (r < 0 || r >= in_.height || first > last) {
+        first = std::max(first, 0);
+        last = std::min(last, in_.width - 1);
+        if (r < 0 || r >= in_.height) {
             return;
         }
         const std::size_t line =
             static_cast<std::size_t>(r) * static_cast<std::size_t>(in_.width + 1);
-        const std::size_t end = in_.start[line + static_cast<std::size_t>(last) + 1];
-        for (std::size_t e = in_.start[line + static_cast<std::size_t>(first)]; e < end;
-             e += hn::Lanes(d_)) {
-            const V du = hn::Sub(hn::LoadU(d_, in_.u + e), x_);
-            const V dv = hn::Sub(hn::LoadU(d_, in_.v + e), y_);
-            const V dz = hn::Sub(hn::LoadU(d_, in_.z + e), z_);
+        const MatchEntry* end = in_.entries + in_.start[line + static_cast<std::size_t>(last) + 1];
+        const MatchEntry* e = in_.entries + in_.start[line + static_cast<std::size_t>(first)];
+        for (; e != end; ++e) {
+            const V du = hn::Sub(set(e->u), x_);
+            const V dv = hn::Sub(set(e->v), y_);
+            const V dz = hn::Sub(set(e->z), z_);
             const V lateral = hn::Mul(hn::Add(hn::Mul(du, du), hn::Mul(dv, dv)), scale_);
-            const V along = hn::Max(leastAlong_, hn::Add(noise_, hn::LoadU(d_, in_.noise + e)));
+            const V along = hn::Max(leastAlong_, hn::Add(noise_, set(e->noise)));
             const V behind = hn::Mul(dz, dz);
-            const V distance =
-                hn::Add(lateral, hn::Mul(hn::Set(d_, kDepthShare), hn::Div(behind, along)));
-            const VI who = hn::LoadU(di_, in_.candidate + e);
-            const auto inGate = hn::And(hn::Le(lateral, hn::Set(d_, 1.0F)), hn::Le(behind, along));
-            const auto tie =
-                hn::And(hn::Eq(distance, best_), hn::RebindMask(d_, hn::Lt(who, who_)));
-            const auto better = hn::And(hn::And(inGate, hn::FirstN(d_, end - e)),
-                                        hn::Or(hn::Lt(distance, best_), tie));
+            const V distance = hn::Add(lateral, hn::Mul(set(kDepthShare), hn::Div(behind, along)));
+            const VI who = hn::Set(di, e->candidate);
+            const M inGate = hn::And(hn::Le(lateral, set(1.0F)), hn::Le(behind, along));
+            const M tie = hn::And(hn::Eq(distance, best_), hn::RebindMask(d, hn::Lt(who, who_)));
+            const M better = hn::And(inGate, hn::Or(hn::Lt(distance, best_), tie));
             best_ = hn::IfThenElse(better, distance, best_);
-            who_ = hn::IfThenElse(hn::RebindMask(di_, better), who, who_);
+            who_ = hn::IfThenElse(hn::RebindMask(di, better), who, who_);
         }
     }
 
-    static constexpr D d_{};
-    static constexpr DI di_{};
     const MatchRow& in_;
-    int column_, radius_ = 0;
-    float lateralScale_ = 0;
+    int first_;
+    M there_;
     V x_, y_, z_, scale_, leastAlong_, noise_, best_;
-    VI who_;
+    VI radius_, who_;
 };
 
 void matchRowOf(const MatchRow& in) {
-    // More than 8 lanes would stay empty: the three pixels of a row hold about three vertices.
-    using D = hn::CappedTag<float, 8>;
-    using DI = hn::CappedTag<std::int32_t, 8>;
-    for (int c = 0; c < in.width; ++c) {
-        in.found[c] = -1;
-        if (in.depth[c] > 0) {
-            Search<D, DI> search(in, c);
-            search.run();
-            search.result(in.distance[c], in.found[c]);
-        }
+    for (int c = 0; c < in.width; c += lanes()) {
+        Search search(in, c);
+        search.run();
+        search.store(in.distance + c, in.found + c, in.width - c);
     }
 }
 

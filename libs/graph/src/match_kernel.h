@@ -27,13 +27,17 @@ inline Gate gateOf(float gamma, float spacing, float sigma, float stretch) {
             std::max({gamma, kNoiseGate * sigma, blur * std::max(1.0F, stretch)})};
 }
 
-/// One row of pixels to match. The arrays of entries lie in the order of pixels: those of column c
-/// in row r are [start[i], start[i + 1]) with i = r (width + 1) + c; they must be readable 64
-/// elements beyond their end.
+/// What matching needs to know of a vertex in view.
+struct MatchEntry {
+    float u, v, z;           ///< column, row [px], depth [m]
+    float noise;             ///< (kNoiseGate sigma)^2 [m^2]
+    std::int32_t candidate;  ///< its number
+};
+
+/// One row of pixels to match. The entries lie in the order of pixels: those of column c in row r
+/// are [start[i], start[i + 1]) with i = r (width + 1) + c.
 struct MatchRow {
-    const float *u = nullptr, *v = nullptr, *z = nullptr;  ///< of an entry: [px], [px], [m]
-    const float* noise = nullptr;                          ///< (kNoiseGate sigma)^2 [m^2]
-    const std::int32_t* candidate = nullptr;
+    const MatchEntry* entries = nullptr;
     const std::uint32_t* start = nullptr;  ///< of the whole image
     int width = 0, height = 0, row = 0;
     float footprint = 0, gamma = 0;
