@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "fuse_kernel.h"
 
+#include <array>
+#include <bit>
 #include <cstddef>
 #include <type_traits>
 
@@ -18,6 +20,7 @@ using D = hn::CappedTag<float, 16>;
 using DI = hn::Rebind<std::int32_t, D>;
 using DU = hn::Rebind<std::uint32_t, D>;
 using D16 = hn::Rebind<std::uint16_t, D>;
+using D8 = hn::Rebind<std::uint8_t, D>;
 using V = hn::Vec<D>;
 using VI = hn::Vec<DI>;
 using VU = hn::Vec<DU>;
@@ -94,12 +97,30 @@ HWY_INLINE VU encodeDirections(const Directions& n) {
     return hn::IfThenElseZero(known, hn::Or(low, hn::ShiftLeft<16>(high)));
 }
 
-/// compact::Sigma::encode
-HWY_INLINE VI encodeSigma(V sigma) {
-    using Sigma = compact::Sigma;
-    const VI bits = hn::Add(hn::BitCast(di, sigma), hn::Set(di, 1 << (Sigma::kShift - 1)));
-    const VI code = hn::Sub(hn::ShiftRight<Sigma::kShift>(bits), hn::Set(di, Sigma::kBias));
-    return hn::Min(hn::Max(code, hn::Zero(di)), hn::Set(di, Sigma::kMax));
+/// compact::SmallFloat::encode of what is not negative
+template <class Code>
+HWY_INLINE VI encode(V value) {
+    const VI bits = hn::Add(hn::BitCast(di, value), hn::Set(di, 1 << (Code::kShift - 1)));
+    const VI code = hn::Sub(hn::ShiftRight<Code::kShift>(bits), hn::Set(di, Code::kBias));
+    return hn::Min(hn::Max(code, hn::Zero(di)), hn::Set(di, Code::kMax));
+}
+/// The nearest float, as a conversion of all 32 bits at once would give.
+HWY_INLINE V toFloat(VU whole) {
+    const auto half = [](VU bits) { return hn::ConvertTo(d, hn::BitCast(di, bits)); };
+    return hn::Add(hn::Mul(half(hn::ShiftRight<16>(whole)), set(65536.0F)),
+                   half(hn::And(whole, hn::Set(du, 0xFFFFU))));
+}
+HWY_INLINE hn::Mask<DU> has(VU flags, std::uint32_t bits) {
+    return hn::Ne(hn::And(flags, hn::Set(du, bits)), hn::Zero(du));
+}
+HWY_INLINE VU bitWhere(hn::Mask<DU> mask, std::uint32_t bit) {
+    return hn::IfThenElseZero(mask, hn::Set(du, bit));
+}
+HWY_INLINE VU loadBytes(const std::uint8_t* at) {
+    return hn::PromoteTo(du, hn::LoadU(D8(), at));
+}
+HWY_INLINE void storeBytes(VU values, std::uint8_t* at) {
+    hn::StoreU(hn::DemoteTo(D8(), hn::BitCast(di, values)), D8(), at);
 }
 
 HWY_INLINE V dot(const Eigen::Matrix3f& r, Eigen::Index row, V x, V y, V z) {
@@ -111,7 +132,7 @@ HWY_INLINE V dot(const Eigen::Matrix3f& r, Eigen::Index row, V x, V y, V z) {
 /// A vector of slots, all of which have a pixel.
 class Fuser {
  public:
-    HWY_INLINE Fuser(const ViewPoints& view, VI pixel) : view_(view), pixel_(pixel) {
+    HWY_INLINE Fuser(const ViewPoints& view, VI pixel) : view_(view) {
         // The quotient of floats is off by one at most.
         const V width = set(static_cast<float>(view.width));
         const VI w = hn::Set(di, view.width);
@@ -139,40 +160,26 @@ class Fuser {
         };
         return {axis(0), axis(1), axis(2)};
     }
-    /// The normal of the pixel's patch in the map frame; false where the pixel is not on it.
-    HWY_INLINE M patchNormal(Directions& normal) const {
+    /// The normal of the pixel's patch in the map frame.
+    HWY_INLINE Directions patchNormal() const {
         static_assert(std::is_standard_layout_v<PatchPlane> && sizeof(PatchPlane) % 4 == 0);
         constexpr int kStride = sizeof(PatchPlane) / 4;
         static_assert(ViewPoints::kPatch == 4);
-        const VI patchColumn = hn::ShiftRight<2>(column_), patchRow = hn::ShiftRight<2>(row_);
-        const VI at =
-            hn::Mul(hn::Add(hn::Mul(patchRow, hn::Set(di, view_.patchColumns())), patchColumn),
-                    hn::Set(di, kStride));
-        const auto* base = reinterpret_cast<const float*>(view_.patches.data());
-        const auto field = [&](std::size_t offset) {
-            return hn::GatherIndex(d, base + offset / 4, at);
-        };
-        const VI two = hn::Set(di, 2);
-        const VI centreColumn = hn::Add(hn::ShiftLeft<2>(patchColumn), two);
-        const VI centreRow =
-            hn::Min(hn::Add(hn::ShiftLeft<2>(patchRow), two), hn::Set(di, view_.height - 1));
-        const V dc = hn::ConvertTo(d, hn::Sub(column_, centreColumn));
-        const V dr = hn::ConvertTo(d, hn::Sub(row_, centreRow));
-        const V expected = hn::Add(hn::Add(field(offsetof(PatchPlane, value)),
-                                           hn::Mul(field(offsetof(PatchPlane, slopeColumn)), dc)),
-                                   hn::Mul(field(offsetof(PatchPlane, slopeRow)), dr));
-        const V off =
-            hn::Abs(hn::Sub(hn::GatherIndex(d, view_.disparity.data(), pixel_), expected));
-        const std::size_t n = offsetof(PatchPlane, normal);
-        const V x = field(n), y = field(n + 4), z = field(n + 8);
-        normal = {dot(view_.rotation, 0, x, y, z), dot(view_.rotation, 1, x, y, z),
-                  dot(view_.rotation, 2, x, y, z)};
-        return hn::Le(off, field(offsetof(PatchPlane, tolerance)));
+        const VI patch =
+            hn::Add(hn::Mul(hn::ShiftRight<2>(row_), hn::Set(di, view_.patchColumns())),
+                    hn::ShiftRight<2>(column_));
+        const VI at = hn::Mul(patch, hn::Set(di, kStride));
+        const auto* base =
+            reinterpret_cast<const float*>(view_.patches.data()) + offsetof(PatchPlane, normal) / 4;
+        const V x = hn::GatherIndex(d, base, at), y = hn::GatherIndex(d, base + 1, at),
+                z = hn::GatherIndex(d, base + 2, at);
+        return {dot(view_.rotation, 0, x, y, z), dot(view_.rotation, 1, x, y, z),
+                dot(view_.rotation, 2, x, y, z)};
     }
 
  private:
     const ViewPoints& view_;
-    VI pixel_, row_, column_;
+    VI row_, column_;
 };
 
 HWY_INLINE void move(float* at, V step, M there) {
@@ -180,65 +187,176 @@ HWY_INLINE void move(float* at, V step, M there) {
     hn::StoreU(hn::IfThenElse(there, hn::Add(old, step), old), d, at);
 }
 
+/// Stores codes of 16 bits where the mask is set.
+HWY_INLINE void storeCodes(VI codes, M there, std::uint16_t* at) {
+    const VI old = hn::PromoteTo(di, hn::LoadU(d16, at));
+    hn::StoreU(hn::DemoteTo(d16, hn::IfThenElse(hn::RebindMask(di, there), codes, old)), d16, at);
+}
+
+/// What the page's vertices are to become, a slot a value.
+struct Fused {
+    alignas(64) std::array<float, Page::kSize> gain{};  ///< weight of the pixel; 0 = not matched
+    alignas(64) std::array<std::uint32_t, Page::kSize> look;
+};
+
+/// Colours byte by byte; the compiler makes vectors of this itself.
+void fuseColours(const Fused& fused, Page& page) {
+    constexpr std::size_t kBytes = 3 * Page::kSize;
+    std::array<float, kBytes> gain;
+    std::array<std::uint8_t, kBytes> seen;
+    for (std::size_t slot = 0; slot < Page::kSize; ++slot) {
+        for (std::size_t i = 0; i < 3; ++i) {
+            gain[3 * slot + i] = fused.gain[slot];
+            seen[3 * slot + i] = static_cast<std::uint8_t>(fused.look[slot] >> (8 * i));
+        }
+    }
+    auto* rgb = page.rgb[0].data();
+    for (std::size_t i = 0; i < kBytes; ++i) {
+        const auto before = static_cast<float>(rgb[i]);
+        rgb[i] = static_cast<std::uint8_t>(
+            compact::roundNearest(before + gain[i] * (static_cast<float>(seen[i]) - before)));
+    }
+}
+
+struct Place {
+    V sigma;
+    /// The normal until now lies more than 45 degrees off that of the pixel, where noise makes the
+    /// gate wide: the pixel shows the surface round an edge.
+    M roundEdge;
+};
+
+/// Position, sigma and normal of the slots of a vector.
+HWY_INLINE Place fusePlaces(const ViewPoints& view, const Fuser& fuser, M there, VU look,
+                            std::uint32_t slot, Page& page, PageFusion& fusion, Fused& fused) {
+    const V a = hn::Max(hn::LoadU(d, fusion.before + slot), set(kTinySigma));
+    const V b = hn::Max(fuser.sigma_, set(kLeastSigma));
+    const V aa = hn::Mul(a, a), sum = hn::Add(aa, hn::Mul(b, b));
+    const V gain = hn::Div(aa, sum);
+    hn::Store(hn::IfThenElseZero(there, gain), d, fused.gain.data() + slot);
+    hn::Store(look, du, fused.look.data() + slot);
+
+    const Directions point = fuser.point();
+    const auto stepTo = [&](V to, const float* from) {
+        return hn::Mul(gain, hn::Sub(to, hn::LoadU(d, from)));
+    };
+    const V dx = stepTo(point.x, page.x.data() + slot);
+    const V dy = stepTo(point.y, page.y.data() + slot);
+    const V dz = stepTo(point.z, page.z.data() + slot);
+    move(page.x.data() + slot, dx, there);
+    move(page.y.data() + slot, dy, there);
+    move(page.z.data() + slot, dz, there);
+
+    const V sigma = hn::Div(hn::Mul(a, b), hn::Sqrt(sum));
+    storeCodes(encode<compact::Sigma>(sigma), there, page.sigma.data() + slot);
+
+    const V spacing = hn::Mul(fuser.z_, set(view.footprint));
+    const M noisy = hn::Gt(fuser.sigma_, hn::Mul(set(kNoisy), spacing));
+    const V length = hn::Sqrt(hn::Add(hn::Mul(dx, dx), hn::Add(hn::Mul(dy, dy), hn::Mul(dz, dz))));
+    const M far = hn::Gt(length, hn::Mul(set(0.02F), spacing));
+    fusion.moved |= slotBits(hn::And(there, hn::AndNot(noisy, far)), slot);
+    const M renew =
+        hn::And(hn::And(there, noisy), hn::RebindMask(d, has(look, ViewPoints::kOnPatch)));
+    if (hn::AllFalse(d, renew)) {
+        return {sigma, renew};
+    }
+    const Directions seen = fuser.patchNormal();
+    const VU old = hn::LoadU(du, page.normal.data() + slot);
+    const Directions known = decodeDirections(old);
+    const V cosine = hn::Add(hn::Mul(known.x, seen.x),
+                             hn::Add(hn::Mul(known.y, seen.y), hn::Mul(known.z, seen.z)));
+    const M apart =
+        hn::And(hn::RebindMask(d, hn::Ne(old, hn::Zero(du))), hn::Lt(cosine, set(kSameSide)));
+    const V rest = hn::Sub(set(1.0F), gain);
+    const auto mixed = [&](V was, V is) { return hn::Add(hn::Mul(rest, was), hn::Mul(gain, is)); };
+    const VU normal =
+        encodeDirections({mixed(known.x, seen.x), mixed(known.y, seen.y), mixed(known.z, seen.z)});
+    hn::StoreU(hn::IfThenElse(hn::RebindMask(du, renew), normal, old), du,
+               page.normal.data() + slot);
+    return {sigma, hn::And(renew, apart)};
+}
+
+/// State and openness.
+HWY_INLINE void updateState(M there, VU flags, V sigma, std::uint32_t slot, Page& page,
+                            PageFusion& fusion) {
+    const VU old = loadBytes(page.state.data() + slot);
+    const VU said = hn::Or(hn::IfThenZeroElse(has(flags, Association::kSomeOpen),
+                                              hn::Set(du, std::uint32_t{kSurrounded})),
+                           bitWhere(has(flags, Association::kSomeFine), kFineEnough));
+    // One view less that saw through it.
+    const VU one = bitWhere(has(old, kEvidenceMask), 1U << kEvidenceShift);
+    const VU state = hn::Sub(hn::Or(old, said), one);
+
+    // Reasons that both views give are better than those of one; else the newer view knows.
+    const VU oldOpen = loadBytes(page.open.data() + slot);
+    const VU now = hn::AndNot(hn::Set(du, std::uint32_t{kTooCoarse}),
+                              hn::ShiftRight<Association::kKindsShift>(flags));
+    const VU both = hn::And(oldOpen, now);
+    const VU kinds = hn::IfThenElse(hn::Ne(both, hn::Zero(du)), both, now);
+    // openBits
+    VU open = hn::IfThenZeroElse(has(state, kSurrounded), kinds);
+    if (fusion.typedOpenness) {
+        const auto rough =
+            hn::RebindMask(du, hn::Gt(hn::Add(sigma, sigma), set(fusion.targetResolution)));
+        open = hn::Or(open, bitWhere(hn::Or(hn::Not(has(state, kFineEnough)), rough), kTooCoarse));
+    }
+    const auto mask = hn::RebindMask(du, there);
+    const auto touched = hn::And(mask, hn::Ne(hn::Or(open, oldOpen), hn::Zero(du)));
+    fusion.touched = fusion.touched || !hn::AllFalse(du, touched);
+    storeBytes(hn::IfThenElse(mask, state, old), page.state.data() + slot);
+    storeBytes(hn::IfThenElse(mask, open, oldOpen), page.open.data() + slot);
+}
+
+/// The pixels of a vertex are its share of the surface, where none of them is cut off.
+HWY_INLINE void updateArea(M whole, VU area, std::uint32_t slot, Page& page) {
+    const V metres = hn::Mul(toFloat(area), set(Association::kAreaUnit));
+    storeCodes(encode<compact::Area>(metres), whole, page.area.data() + slot);
+}
+
+std::int64_t areaUnits(const std::array<std::uint16_t, Page::kSize>& codes) {
+    std::int64_t sum = 0;
+    for (const std::uint16_t code : codes) {
+        sum += compact::areaUnits(code);
+    }
+    return sum;
+}
+
 void fuseOf(const ViewPoints& view, Page& page, PageFusion& fusion) {
     const auto lanes = static_cast<std::uint32_t>(hn::Lanes(d));
-    fusion.moved = fusion.roundEdge = 0;
+    const std::array<std::uint16_t, Page::kSize> oldArea = page.area;
+    fusion.matched = fusion.moved = 0;
+    fusion.touched = false;
+    Fused fused;
     for (std::uint32_t slot = 0; slot < Page::kSize; slot += lanes) {
-        const M there = slotMask(fusion.matched, slot);
+        VU pixel, distance, surface, flags;
+        static_assert(std::endian::native == std::endian::little &&
+                      sizeof(Association::Claims) == 16);
+        hn::LoadInterleaved4(du, reinterpret_cast<const std::uint32_t*>(fusion.claims + slot),
+                             pixel, distance, surface, flags);
+        const M there = hn::And(slotMask(fusion.inView, slot),
+                                hn::RebindMask(d, hn::Ne(pixel, hn::Set(du, Association::kNone))));
         if (hn::AllFalse(d, there)) {
             continue;
         }
-        const Fuser fuser(view, hn::BitCast(di, hn::LoadU(du, fusion.pixel.data() + slot)));
-        const V a = hn::Max(hn::LoadU(d, fusion.before + slot), set(kTinySigma));
-        const V b = hn::Max(fuser.sigma_, set(kLeastSigma));
-        const V aa = hn::Mul(a, a), sum = hn::Add(aa, hn::Mul(b, b));
-        const V gain = hn::Div(aa, sum);
-        hn::StoreU(gain, d, fusion.gain.data() + slot);
-
-        const Directions point = fuser.point();
-        const auto stepTo = [&](V to, const float* from) {
-            return hn::Mul(gain, hn::Sub(to, hn::LoadU(d, from)));
-        };
-        const V dx = stepTo(point.x, page.x.data() + slot);
-        const V dy = stepTo(point.y, page.y.data() + slot);
-        const V dz = stepTo(point.z, page.z.data() + slot);
-        move(page.x.data() + slot, dx, there);
-        move(page.y.data() + slot, dy, there);
-        move(page.z.data() + slot, dz, there);
-
-        const V sigma = hn::Div(hn::Mul(a, b), hn::Sqrt(sum));
-        hn::StoreU(sigma, d, fusion.sigma.data() + slot);
-        const VI oldCode = hn::PromoteTo(di, hn::LoadU(d16, page.sigma.data() + slot));
-        const VI code = hn::IfThenElse(hn::RebindMask(di, there), encodeSigma(sigma), oldCode);
-        hn::StoreU(hn::DemoteTo(d16, code), d16, page.sigma.data() + slot);
-
-        const V spacing = hn::Mul(fuser.z_, set(view.footprint));
-        const M noisy = hn::Gt(fuser.sigma_, hn::Mul(set(kNoisy), spacing));
-        const V length =
-            hn::Sqrt(hn::Add(hn::Mul(dx, dx), hn::Add(hn::Mul(dy, dy), hn::Mul(dz, dz))));
-        const M far = hn::Gt(length, hn::Mul(set(0.02F), spacing));
-        fusion.moved |= slotBits(hn::And(there, hn::AndNot(noisy, far)), slot);
-        if (hn::AllFalse(d, hn::And(there, noisy))) {
-            continue;
+        fusion.matched |= slotBits(there, slot);
+        pixel = hn::IfThenElseZero(hn::RebindMask(du, there), pixel);
+        const VI at = hn::BitCast(di, pixel);
+        Place place{hn::LoadU(d, fusion.before + slot), hn::AndNot(there, there)};
+        if (!fusion.firstStays) {
+            const VU look = hn::GatherIndex(du, view.look.data(), at);
+            place = fusePlaces(view, Fuser(view, at), there, look, slot, page, fusion, fused);
         }
-        Directions seen;
-        const M onPatch = fuser.patchNormal(seen);
-        const VU old = hn::LoadU(du, page.normal.data() + slot);
-        const Directions known = decodeDirections(old);
-        const M renew = hn::And(there, hn::And(noisy, onPatch));
-        const V cosine = hn::Add(hn::Mul(known.x, seen.x),
-                                 hn::Add(hn::Mul(known.y, seen.y), hn::Mul(known.z, seen.z)));
-        const M apart =
-            hn::And(hn::RebindMask(d, hn::Ne(old, hn::Zero(du))), hn::Lt(cosine, set(kSameSide)));
-        fusion.roundEdge |= slotBits(hn::And(renew, apart), slot);
-        const V rest = hn::Sub(set(1.0F), gain);
-        const auto mixed = [&](V was, V is) {
-            return hn::Add(hn::Mul(rest, was), hn::Mul(gain, is));
-        };
-        const VU normal = encodeDirections(
-            {mixed(known.x, seen.x), mixed(known.y, seen.y), mixed(known.z, seen.z)});
-        hn::StoreU(hn::IfThenElse(hn::RebindMask(du, renew), normal, old), du,
-                   page.normal.data() + slot);
+        updateState(there, flags, place.sigma, slot, page, fusion);
+        // Seen at less than 60 degrees: its share of the surface can be told.
+        const V stretch = hn::GatherIndex(d, view.stretch.data(), at);
+        const M frontal = hn::And(hn::Ge(stretch, set(1.0F)), hn::Le(stretch, set(2.0F)));
+        const auto cut = has(flags, Association::kSomeOpen);
+        const auto uncut = hn::AndNot(cut, has(flags, Association::kSomeSurrounded));
+        const M whole = hn::And(hn::And(there, frontal), hn::RebindMask(d, uncut));
+        updateArea(hn::AndNot(place.roundEdge, whole), surface, slot, page);
+    }
+    fusion.area = areaUnits(page.area) - areaUnits(oldArea);
+    if (fusion.matched != 0 && !fusion.firstStays) {
+        fuseColours(fused, page);
     }
 }
 

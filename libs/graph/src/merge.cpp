@@ -42,8 +42,6 @@ MergeResult Merger::merge(const View& view, GraphStorage& storage, RiftFinder& r
     MergeResult result;
     StopWatch watch;
     points_.build(view, options_);
-    image_ = view.image.isContinuous() ? view.image : view.image.clone();
-    channels_ = image_.empty() ? 0 : static_cast<std::size_t>(image_.channels());
     times_.points = watch.lap();
     seen_.project(storage, points_, options_);
     seen_.match(points_, options_);
@@ -72,12 +70,14 @@ MergeResult Merger::merge(const View& view, GraphStorage& storage, RiftFinder& r
     return result;
 }
 
-/// Asks for the page in view that comes next: pages lie anywhere, so the processor cannot foresee.
+/// Asks for a page in view before its turn comes: pages lie anywhere, so the processor cannot
+/// foresee.
 void Merger::prefetchPage(const GraphStorage& storage, std::uint32_t which) const {
     if (which < seen_.pages.size()) {
         const Page& page = storage.page(seen_.pages[which]);
-        prefetch(&page.sigma, offsetof(Page, neighbour) - offsetof(Page, sigma));
+        prefetch(&page, offsetof(Page, neighbour));
         prefetch(&page.weight, sizeof(page.weight));
+        prefetch(&page.alive, sizeof(page.alive));
     }
 }
 
@@ -108,44 +108,6 @@ void Merger::findSeenThroughEdges(const GraphStorage& storage, std::uint32_t whi
             }
         });
     });
-}
-
-std::uint8_t Merger::openBits(std::uint8_t kinds, std::uint8_t state, float sigma) const {
-    unsigned bits = (state & kSurrounded) != 0 ? 0U : kinds & ~unsigned{kTooCoarse};
-    const auto target = static_cast<float>(options_.targetResolution);
-    if (options_.typedOpenness && ((state & kFineEnough) == 0 || 2 * sigma > target)) {
-        bits |= kTooCoarse;
-    }
-    return static_cast<std::uint8_t>(bits);
-}
-
-/// What a view says of a matched vertex beside its place: its state, openness and share of the
-/// surface.
-void Merger::update(Page& page, std::uint32_t slot, std::uint32_t candidate, float sigma,
-                    bool roundEdge, PageWork& work) {
-    const Association::Claims& claims = seen_.claims[candidate];
-    const auto pixel = static_cast<std::uint32_t>(claims.best);
-    std::uint8_t& state = page.state[slot];
-    state = static_cast<std::uint8_t>(
-        state | ((claims.flags & Association::kSomeOpen) == 0 ? kSurrounded : 0) |
-        ((claims.flags & Association::kSomeFine) != 0 ? kFineEnough : 0));
-    const unsigned evidence = evidenceOf(state);
-    state = withEvidence(state, evidence > 0 ? evidence - 1 : 0);
-    // Reasons that both views give are better than those of one; else the newer view knows.
-    const unsigned before = page.open[slot] & ~unsigned{kTooCoarse};
-    const unsigned now = claims.flags >> Association::kKindsShift;
-    const std::uint8_t open =
-        openBits(static_cast<std::uint8_t>((before & now) != 0 ? before & now : now), state, sigma);
-    work.touched = work.touched || open != 0 || page.open[slot] != 0;
-    page.open[slot] = open;
-    // The pixels of a vertex are its share of the surface, where none of them is cut off.
-    if (frontal(pixel) && (claims.flags & Association::kSomeSurrounded) != 0 &&
-        (claims.flags & Association::kSomeOpen) == 0 && !roundEdge) {
-        const float area = static_cast<float>(claims.area) * Association::kAreaUnit;
-        const std::uint16_t code = compact::Area::encode(area);
-        work.area += compact::areaUnits(code) - compact::areaUnits(page.area[slot]);
-        page.area[slot] = code;
-    }
 }
 
 /// True unless vertex and pixel lie on two sides of an edge: the surface that the pixel shows is
@@ -247,38 +209,24 @@ void Merger::fuseAlongRay(Page& page, std::uint32_t slot, const Candidate& seen,
 
 void Merger::fusePage(GraphStorage& storage, std::uint32_t which) {
     Page& page = storage.page(seen_.pages[which]);
+    prefetchPage(storage, which + 1);
     PageWork& work = work_[which];
     const std::uint32_t first = which * Page::kSize;
-    const std::uint64_t inView = seen_.slotsInView(which);
     PageFusion fusion;
-    forEachBit(inView, [&](std::uint32_t slot) {
-        const std::uint32_t pixel = seen_.bestPixel(first + slot);
-        if (pixel != Association::kNone) {
-            fusion.matched |= std::uint64_t{1} << slot;
-            fusion.pixel[slot] = pixel;
-        }
-    });
-    if (paper()) {  // the first position stays
-        forEachBit(fusion.matched, [&](std::uint32_t slot) {
-            update(page, slot, first + slot, compact::Sigma::decode(page.sigma[slot]), false, work);
-        });
-        return;
-    }
+    fusion.inView = seen_.slotsInView(which);
+    fusion.claims = &seen_.claims[first];
     fusion.before = seen_.sigmas(which);
+    fusion.firstStays = paper();
+    fusion.typedOpenness = options_.typedOpenness;
+    fusion.targetResolution = static_cast<float>(options_.targetResolution);
     fuseMatched(points_, page, fusion);
     work.moved = fusion.moved;
-    forEachBit(fusion.matched, [&](std::uint32_t slot) {
-        const float gain = fusion.gain[slot];
-        const std::array<std::uint8_t, 3> colour = colourAt(fusion.pixel[slot]);
-        for (std::size_t i = 0; i < 3; ++i) {
-            const float before = page.rgb[slot][i];
-            page.rgb[slot][i] = static_cast<std::uint8_t>(
-                compact::roundNearest(before + gain * (static_cast<float>(colour[i]) - before)));
-        }
-        update(page, slot, first + slot, fusion.sigma[slot], ((fusion.roundEdge >> slot) & 1U) != 0,
-               work);
-    });
-    forEachBit(inView & ~fusion.matched,
+    work.area = fusion.area;
+    work.touched = fusion.touched;
+    if (paper()) {
+        return;
+    }
+    forEachBit(fusion.inView & ~fusion.matched,
                [&](std::uint32_t slot) { passOver(page, slot, first + slot, work); });
     storage.updatePageBounds(seen_.pages[which]);
 }
@@ -388,7 +336,9 @@ void Merger::grow(GraphStorage& storage, MergeResult& result) {
         page.z[slot] = p.z();
         page.sigma[slot] = compact::Sigma::encode(std::max(points_.sigma[pixel], kLeastSigma));
         page.area[slot] = compact::Area::encode(points_.area[pixel]);
-        page.rgb[slot] = colourAt(pixel);
+        const std::uint32_t look = points_.look[pixel];
+        page.rgb[slot] = {static_cast<std::uint8_t>(look), static_cast<std::uint8_t>(look >> 8U),
+                          static_cast<std::uint8_t>(look >> 16U)};
         const bool fine = points_.spacing(pixel) <= static_cast<float>(options_.targetResolution);
         page.state[slot] = static_cast<std::uint8_t>((points_.kinds[pixel] == 0 ? kSurrounded : 0) |
                                                      (fine ? kFineEnough : 0));

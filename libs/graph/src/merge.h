@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "association.h"
+#include "fuse_kernel.h"
 #include "rift_finder.h"
 #include "riftmap/core/parallel.h"
 #include "riftmap/graph/graph_storage.h"
@@ -81,8 +82,6 @@ class Merger {
     void prefetchPage(const GraphStorage& storage, std::uint32_t which) const;
     void findSeenThroughEdges(const GraphStorage& storage, std::uint32_t which);
     void fusePage(GraphStorage& storage, std::uint32_t which);
-    void update(Page& page, std::uint32_t slot, std::uint32_t candidate, float sigma,
-                bool roundEdge, PageWork& work);
     void passOver(Page& page, std::uint32_t slot, std::uint32_t candidate, PageWork& work);
     void fuseAlongRay(Page& page, std::uint32_t slot, const Candidate& seen, float depth,
                       float pixelSigma, PageWork& work);
@@ -97,27 +96,19 @@ class Merger {
     bool wanted(const GraphStorage& storage, const NewEdge& edge) const;
     void refreshNormals(GraphStorage& storage);
     void finish(GraphStorage& storage, RiftFinder& rifts, std::int64_t& area);
-    std::uint8_t openBits(std::uint8_t kinds, std::uint8_t state, float sigma) const;
+    std::uint8_t openBits(std::uint8_t kinds, std::uint8_t state, float sigma) const {
+        return riftmap::openBits(kinds, state, sigma, options_.typedOpenness,
+                                 static_cast<float>(options_.targetResolution));
+    }
     /// Seen at less than 60 degrees: its share of the surface can be told.
     bool frontal(std::size_t pixel) const {
         return points_.stretch[pixel] >= 1.0F && points_.stretch[pixel] <= 2.0F;
     }
     bool paper() const { return options_.fusion == GraphOptions::Fusion::kFirst; }
 
-    /// Red, green, blue; grey where the view has no image.
-    std::array<std::uint8_t, 3> colourAt(std::size_t pixel) const {
-        const std::uint8_t* at = image_.data + channels_ * pixel;
-        if (channels_ == 0) {
-            return {128, 128, 128};
-        }
-        return channels_ == 1 ? std::array{at[0], at[0], at[0]} : std::array{at[2], at[1], at[0]};
-    }
-
     GraphOptions options_;
     MergeTimes times_;
     ViewPoints points_;
-    cv::Mat image_;             ///< of the view, its rows one after the other
-    std::size_t channels_ = 0;  ///< 0 without an image
     Association seen_;
     std::vector<PageWork> work_;         ///< beside seen_.pages
     std::vector<VertexId> vertexOf_;     ///< pixel -> vertex that it shows

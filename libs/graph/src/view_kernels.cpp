@@ -250,6 +250,23 @@ void areasOf(const AngleRow& in) {
     }
 }
 
+void looksOf(const LookRow& in) {
+    // The compiler makes vectors of these itself.
+    const auto onPatch = [&in](int c) { return in.onPlane[c] * ViewPoints::kOnPatch; };
+    if (in.channels == 3) {
+        for (int c = 0; c < in.width; ++c) {
+            const std::uint8_t* at = in.image + 3 * static_cast<std::ptrdiff_t>(c);
+            in.look[c] =
+                onPatch(c) | unsigned{at[2]} | unsigned{at[1]} << 8U | unsigned{at[0]} << 16U;
+        }
+        return;
+    }
+    for (int c = 0; c < in.width; ++c) {
+        const unsigned grey = in.channels == 0 ? 128U : unsigned{in.image[c]};
+        in.look[c] = onPatch(c) | grey * 0x010101U;
+    }
+}
+
 HWY_INLINE V square(V x) {
     return hn::Mul(x, x);
 }
@@ -323,6 +340,7 @@ HWY_EXPORT(depthsOf);
 HWY_EXPORT(fitPatches);
 HWY_EXPORT(anglesOf);
 HWY_EXPORT(areasOf);
+HWY_EXPORT(looksOf);
 HWY_EXPORT(edgesOf);
 HWY_EXPORT(kindsOf);
 
@@ -337,6 +355,9 @@ void anglesOfRow(const AngleRow& row, std::uint8_t* onPlane) {
 }
 void areasOfRow(const AngleRow& row) {
     HWY_DYNAMIC_DISPATCH(areasOf)(row);
+}
+void looksOfRow(const LookRow& row) {
+    HWY_DYNAMIC_DISPATCH(looksOf)(row);
 }
 void edgesOfRow(const EdgeRow& row) {
     HWY_DYNAMIC_DISPATCH(edgesOf)(row);

@@ -51,6 +51,16 @@ void anglesOfRow(const AngleRow& row, std::uint8_t* onPlane);
 /// z^2 / (fx fy |n . ray|), where 1 / |n . ray| = stretch / |ray|.
 void areasOfRow(const AngleRow& row);
 
+/// ViewPoints::look of a row.
+struct LookRow {
+    const std::uint8_t* image = nullptr;  ///< grey, or blue, green, red
+    int channels = 0;                     ///< 0: no image
+    const std::uint8_t* onPlane = nullptr;
+    int width = 0;
+    std::uint32_t* look = nullptr;
+};
+void looksOfRow(const LookRow& row);
+
 /// Edges from each pixel of a row to one beside or below it.
 struct EdgeRow {
     const float *z = nullptr, *sigma = nullptr, *rayX = nullptr;     ///< of the pixels

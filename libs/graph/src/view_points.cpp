@@ -41,6 +41,7 @@ void ViewPoints::resize(int newWidth, int newHeight) {
     right.resize(n + 64, kNoEdge);  // vector code reads whole vectors
     down.resize(n + 64, kNoEdge);
     kinds.resize(n);
+    look.resize(n);
     rayX_.resize(static_cast<std::size_t>(width));
     rayY_.resize(static_cast<std::size_t>(height));
     patchColumns_ = (width + kPatch - 1) / kPatch;
@@ -80,7 +81,7 @@ void ViewPoints::build(const View& view, const GraphOptions& options) {
         },
         [](std::size_t a, std::size_t b) { return a + b; });
     forEachRow(patchRows_, kPatchRowsAtOnce, [&](int r) { fitPatches(view.disparity, r); });
-    forEachRow(patchRows_, kPatchRowsAtOnce, [&](int r) { computeAngles(r); });
+    forEachRow(patchRows_, kPatchRowsAtOnce, [&](int r) { computeAngles(view.image, r); });
     forEachRow(height, kRowsAtOnce, [&](int r) { computeEdges(options, r); });
     forEachRow(height, kRowsAtOnce,
                [&](int r) { computeKinds(options, view.disparity.firstColumn, r); });
@@ -121,7 +122,7 @@ void ViewPoints::fitPatches(const DisparityImage& image, int patchRow) {
     fitPatchRow(in);
 }
 
-void ViewPoints::computeAngles(int patchRow) {
+void ViewPoints::computeAngles(const cv::Mat& image, int patchRow) {
     // What a patch says to each of its columns, once for its rows.
     const auto w = static_cast<std::size_t>(width);
     thread_local std::vector<float> columns;
@@ -163,6 +164,8 @@ void ViewPoints::computeAngles(int patchRow) {
             }
         }
         areasOfRow(in);
+        looksOfRow({image.empty() ? nullptr : image.ptr<std::uint8_t>(r),
+                    image.empty() ? 0 : image.channels(), onPlane.data(), width, &look[line]});
     }
 }
 
@@ -276,7 +279,7 @@ void ViewPoints::computeKinds(const GraphOptions& options, int firstColumn, int 
     const auto atBorder = [&](int c) {
         const std::size_t i = line + static_cast<std::size_t>(c);
         unsigned bits = 0;
-        const auto look = [&](int c2, int r2, std::uint16_t code) {
+        const auto lookAtEdge = [&](int c2, int r2, std::uint16_t code) {
             if (c2 < 0 || r2 < 0 || c2 >= width || r2 >= height) {
                 bits |= kImageBorder;
             } else if (code == kNoEdge) {
@@ -286,10 +289,10 @@ void ViewPoints::computeKinds(const GraphOptions& options, int firstColumn, int 
             }
         };
         if (z[i] > 0) {
-            look(c + 1, row, right[i]);
-            look(c, row + 1, down[i]);
-            look(c - 1, row, c > 0 ? right[i - 1] : kNoEdge);
-            look(c, row - 1, row > 0 ? down[i - w] : kNoEdge);
+            lookAtEdge(c + 1, row, right[i]);
+            lookAtEdge(c, row + 1, down[i]);
+            lookAtEdge(c - 1, row, c > 0 ? right[i - 1] : kNoEdge);
+            lookAtEdge(c, row - 1, row > 0 ? down[i - w] : kNoEdge);
         }
         kinds[i] = static_cast<std::uint8_t>(bits);
     };

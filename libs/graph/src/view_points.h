@@ -41,7 +41,9 @@ class ViewPoints {
     static constexpr std::uint16_t kNoEdge = 0xFFFF;
     static constexpr int kPatch = 4;              ///< side of the patches that share a plane [px]
     static constexpr float kLargestStretch = 10;  ///< beyond 84 degrees no angle explains anything
-    static constexpr int kPhasePad = 1;           ///< patches of room before a row of phases_
+    /// Bit of `look`: the pixel lies on the plane of its patch.
+    static constexpr std::uint32_t kOnPatch = 1U << 24U;
+    static constexpr int kPhasePad = 1;  ///< patches of room before a row of phases_
 
     /// Eqs. (1)-(3) for a checked view; sorts pixels by what their neighbours are.
     void build(const View& view, const GraphOptions& options);
@@ -49,9 +51,9 @@ class ViewPoints {
     int width = 0, height = 0;
     std::size_t validCount = 0;
     float fx = 1, fy = 1, cx = 0, cy = 0, fb = 1;
-    float footprint = 1;          ///< side of a pixel at a depth of 1 m [m]
-    Eigen::Matrix3f rotation;     ///< world_R_camera
-    Eigen::Vector3f translation;  ///< of the camera in the map frame
+    float footprint = 1;  ///< side of a pixel at a depth of 1 m [m]
+    Eigen::Matrix3f rotation = Eigen::Matrix3f::Identity();  ///< world_R_camera
+    Eigen::Vector3f translation = Eigen::Vector3f::Zero();   ///< of the camera in the map frame
 
     std::vector<float> z;          ///< depth [m]; 0 = no vertex
     std::vector<float> sigma;      ///< standard deviation of z [m]
@@ -60,12 +62,14 @@ class ViewPoints {
     std::vector<float> area;       ///< surface that the pixel stands for [m^2]
     std::vector<std::uint16_t> right, down;  ///< weight code of the edge there, or kNoEdge
     std::vector<std::uint8_t> kinds;         ///< OpenKind bits but kTooCoarse
-    std::vector<PatchPlane> patches;         ///< a plane a patch, row-major
+    /// Red | green << 8 | blue << 16, grey where the view has no image; kOnPatch.
+    std::vector<std::uint32_t> look;
+    std::vector<PatchPlane> patches;  ///< a plane a patch, row-major
 
     std::size_t memoryBytes() const {
         return bytesOf(z) + bytesOf(sigma) + bytesOf(disparity) + bytesOf(stretch) + bytesOf(area) +
-               bytesOf(right) + bytesOf(down) + bytesOf(kinds) + bytesOf(patches) + bytesOf(rayX_) +
-               bytesOf(rayY_) + bytesOf(phases_);
+               bytesOf(right) + bytesOf(down) + bytesOf(kinds) + bytesOf(look) + bytesOf(patches) +
+               bytesOf(rayX_) + bytesOf(rayY_) + bytesOf(phases_);
     }
     std::size_t index(int column, int row) const {
         return static_cast<std::size_t>(row) * static_cast<std::size_t>(width) +
@@ -89,17 +93,14 @@ class ViewPoints {
     Eigen::Vector3f inMap(int column, int row) const {
         return rotation * inCamera(column, row, z[index(column, row)]) + translation;
     }
-    /// True if the pixel lies on the plane of its patch.
-    bool onPatch(int column, int row) const {
-        const PatchPlane& p = patch(column, row);
-        return std::abs(disparity[index(column, row)] - p.disparity(column, row)) <= p.tolerance;
-    }
+    /// True if the pixel differs from the plane of its patch by the patch's tolerance at most.
+    bool onPatch(int column, int row) const { return (look[index(column, row)] & kOnPatch) != 0; }
 
  private:
     void resize(int newWidth, int newHeight);
     std::size_t computeDepth(const View& view, int row);
     void fitPatches(const DisparityImage& image, int patchRow);
-    void computeAngles(int patchRow);
+    void computeAngles(const cv::Mat& image, int patchRow);
     float angleFromPatches(int column, int row) const;
     float angleFromNeighbours(int column, int row) const;
     void computeEdges(const GraphOptions& options, int row);

@@ -125,6 +125,14 @@ TEST(GraphKernels, PatchesAreLeastSquaresPlanes) {
         const View view = oddView(random, scene);
         ViewPoints points;
         points.build(view, randomOptions(random));
+        for (int r = 0; r < points.height; ++r) {
+            for (int c = 0; c < points.width; ++c) {
+                const PatchPlane& patch = points.patch(c, r);
+                const float d = points.disparity[points.index(c, r)];
+                EXPECT_EQ(points.onPatch(c, r),
+                          std::abs(d - patch.disparity(c, r)) <= patch.tolerance);
+            }
+        }
         for (int r = 0; r < points.height; r += 4) {
             for (int c = 0; c < points.width; c += 4) {
                 const PatchPlane& fast = points.patch(c, r);
@@ -282,74 +290,166 @@ TEST(GraphKernels, ProjectionIsEquation4) {
     }
 }
 
-TEST(GraphKernels, FusionIsByInverseVariance) {
-    std::size_t fused = 0, turned = 0;
-    for (std::uint64_t seed = 1; seed <= 6; ++seed) {
-        SCOPED_TRACE("seed " + std::to_string(seed));
-        Random random(seed);
-        const Scene scene = randomScene(random);
-        ViewPoints points;
-        points.build(oddView(random, scene), GraphOptions{});
+/// What the pixels of a vertex say beside its place, one by one.
+void slowUpdate(const ViewPoints& points, const Association::Claims& claims, float sigma,
+                bool roundEdge, const GraphOptions& options, Page& page, std::uint32_t slot) {
+    const auto pixel = static_cast<std::uint32_t>(claims.best);
+    unsigned state = page.state[slot];
+    const unsigned evidence = (state & kEvidenceMask) >> kEvidenceShift;
+    state = (state & ~unsigned{kEvidenceMask}) | (evidence > 0 ? evidence - 1 : 0)
+                                                     << kEvidenceShift;
+    state |= (claims.flags & Association::kSomeOpen) == 0 ? unsigned{kSurrounded} : 0U;
+    state |= (claims.flags & Association::kSomeFine) != 0 ? unsigned{kFineEnough} : 0U;
+    const unsigned before = page.open[slot] & ~unsigned{kTooCoarse};
+    const unsigned now = claims.flags >> Association::kKindsShift;
+    const unsigned kinds = (before & now) != 0 ? before & now : now;
+    unsigned open = (state & kSurrounded) != 0 ? 0 : kinds;
+    if (options.typedOpenness &&
+        ((state & kFineEnough) == 0 || 2 * sigma > static_cast<float>(options.targetResolution))) {
+        open |= kTooCoarse;
+    }
+    page.state[slot] = static_cast<std::uint8_t>(state);
+    page.open[slot] = static_cast<std::uint8_t>(open);
+    const bool frontal = points.stretch[pixel] >= 1 && points.stretch[pixel] <= 2;
+    if (frontal && (claims.flags & Association::kSomeSurrounded) != 0 &&
+        (claims.flags & Association::kSomeOpen) == 0 && !roundEdge) {
+        page.area[slot] =
+            compact::Area::encode(static_cast<float>(claims.area) * Association::kAreaUnit);
+    }
+}
+
+/// A page of vertices anywhere, and for most of them pixels that matched.
+struct FusionCase {
+    Page page{};
+    std::array<Association::Claims, Page::kSize> claims{};
+    std::array<float, Page::kSize> sigma{};
+    PageFusion fusion;
+    FusionCase(Random& random, const ViewPoints& points, const GraphOptions& options) {
         std::vector<std::uint32_t> pixels;
         for (std::uint32_t i = 0; i < points.z.size(); ++i) {
             if (points.z[i] > 0) {
                 pixels.push_back(i);
             }
         }
-        Page page{};
-        PageFusion fusion;
-        std::array<float, Page::kSize> sigma{};
+        const auto below = [&random](std::size_t n) {
+            return static_cast<std::uint32_t>(random.below(static_cast<int>(n)));
+        };
         for (std::uint32_t s = 0; s < Page::kSize; ++s) {
             page.x[s] = static_cast<float>(random.in(-2, 2));
             page.y[s] = static_cast<float>(random.in(-2, 2));
             page.z[s] = static_cast<float>(random.in(-2, 2));
-            sigma[s] = static_cast<float>(random.in(0, 0.02));
+            page.sigma[s] = compact::Sigma::encode(static_cast<float>(random.in(0, 0.02)));
+            sigma[s] = compact::Sigma::decode(page.sigma[s]);
             page.normal[s] =
-                random.below(8) == 0 ? 0 : compact::encodeDirection(random.point(1).cast<float>());
-            fusion.pixel[s] =
-                pixels[static_cast<std::size_t>(random.below(static_cast<int>(pixels.size())))];
-            fusion.matched |= std::uint64_t{random.below(4) != 0} << s;
+                below(8) == 0 ? 0 : compact::encodeDirection(random.point(1).cast<float>());
+            page.area[s] = static_cast<std::uint16_t>(below(0x10000));
+            page.open[s] = static_cast<std::uint8_t>(below(16));
+            page.state[s] = static_cast<std::uint8_t>(below(64));
+            for (std::uint8_t& channel : page.rgb[s]) {
+                channel = static_cast<std::uint8_t>(below(256));
+            }
+            if (below(4) != 0) {
+                claims[s] = {std::uint64_t{below(1000)} << 32U | pixels[below(pixels.size())],
+                             below(2) == 0 ? below(2000) : below(2000) << 20U, below(64)};
+            }
+            fusion.inView |= std::uint64_t{below(8) != 0} << s;
         }
+        fusion.claims = claims.data();
         fusion.before = sigma.data();
-        const Page old = page;
+        fusion.firstStays = options.fusion == GraphOptions::Fusion::kFirst;
+        fusion.typedOpenness = options.typedOpenness;
+        fusion.targetResolution = static_cast<float>(options.targetResolution);
+    }
+};
+
+TEST(GraphKernels, FusionIsByInverseVariance) {
+    std::size_t fused = 0, turned = 0, round = 0, grown = 0;
+    for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+        SCOPED_TRACE("seed " + std::to_string(seed));
+        Random random(seed);
+        const Scene scene = randomScene(random);
+        const GraphOptions options = randomOptions(random);
+        ViewPoints points;
+        points.build(oddView(random, scene), options);
+        FusionCase given(random, points, options);
+        const Page old = given.page;
+        Page& page = given.page;
+        PageFusion& fusion = given.fusion;
         fuseMatched(points, page, fusion);
+        Page expected = old;
+        bool touched = false;
+        std::int64_t area = 0;
         for (std::uint32_t s = 0; s < Page::kSize; ++s) {
-            if (((fusion.matched >> s) & 1U) == 0) {
+            SCOPED_TRACE("slot " + std::to_string(s));
+            const Association::Claims& claims = given.claims[s];
+            const auto i = static_cast<std::uint32_t>(claims.best);
+            const bool matched = ((fusion.inView >> s) & 1U) != 0 && i != Association::kNone;
+            ASSERT_EQ((fusion.matched >> s) & 1U, matched ? 1U : 0U);
+            if (!matched || fusion.firstStays) {
                 EXPECT_EQ(page.position(s), old.position(s));
                 EXPECT_EQ(page.sigma[s], old.sigma[s]);
                 EXPECT_EQ(page.normal[s], old.normal[s]);
+                EXPECT_EQ(page.rgb[s], old.rgb[s]);
                 EXPECT_EQ((fusion.moved >> s) & 1U, 0U);
-                continue;
             }
-            ++fused;
-            const std::uint32_t i = fusion.pixel[s];
-            const int c = static_cast<int>(i) % points.width,
-                      r = static_cast<int>(i) / points.width;
-            const double a = std::max<double>(sigma[s], kTinySigma);
-            const double b = std::max<double>(points.sigma[i], kLeastSigma);
-            const double gain = a * a / (a * a + b * b);
-            const Eigen::Vector3f step = (points.inMap(c, r) - old.position(s)) * float(gain);
-            EXPECT_LT((page.position(s) - old.position(s) - step).norm(), 1e-5F);
-            EXPECT_NEAR(compact::Sigma::decode(page.sigma[s]), 1 / std::hypot(1 / a, 1 / b), 1e-5);
-            const double spacing = static_cast<double>(points.z[i] * points.footprint);
-            const bool noisy = points.sigma[i] > 0.25F * points.z[i] * points.footprint;
-            if (noisy && points.onPatch(c, r)) {
-                ++turned;
-                const Eigen::Vector3f mixed =
-                    float(1 - gain) * compact::decodeDirection(old.normal[s]) +
-                    float(gain) * (points.rotation * points.patch(c, r).normal);
-                EXPECT_LT((compact::decodeDirection(page.normal[s]) - mixed.normalized()).norm(),
-                          1e-3F);
-            } else {
-                EXPECT_EQ(page.normal[s], old.normal[s]);
+            bool roundEdge = false;
+            if (matched && !fusion.firstStays) {
+                ++fused;
+                const int c = static_cast<int>(i) % points.width,
+                          r = static_cast<int>(i) / points.width;
+                const float a = std::max(given.sigma[s], kTinySigma);
+                const float b = std::max(points.sigma[i], kLeastSigma);
+                const float gain = a * a / (a * a + b * b);
+                const Eigen::Vector3f step = (points.inMap(c, r) - old.position(s)) * gain;
+                EXPECT_LT((page.position(s) - old.position(s) - step).norm(), 1e-5F);
+                EXPECT_NEAR(compact::Sigma::decode(page.sigma[s]), 1 / std::hypot(1 / a, 1 / b),
+                            1e-5);
+                for (std::size_t k = 0; k < 3; ++k) {
+                    const auto was = static_cast<float>(old.rgb[s][k]);
+                    const auto is = static_cast<float>((points.look[i] >> (8 * k)) & 0xFFU);
+                    EXPECT_EQ(page.rgb[s][k], compact::roundNearest(was + gain * (is - was)));
+                }
+                const float spacing = points.z[i] * points.footprint;
+                const bool noisy = points.sigma[i] > 0.25F * spacing;
+                if (noisy && points.onPatch(c, r)) {
+                    ++turned;
+                    const Eigen::Vector3f known = compact::decodeDirection(old.normal[s]);
+                    const Eigen::Vector3f seen = points.rotation * points.patch(c, r).normal;
+                    const Eigen::Vector3f mixed = (1 - gain) * known + gain * seen;
+                    EXPECT_LT(
+                        (compact::decodeDirection(page.normal[s]) - mixed.normalized()).norm(),
+                        1e-3F);
+                    roundEdge = old.normal[s] != 0 && known.dot(seen) < kSameSide;
+                    round += roundEdge ? 1 : 0;
+                } else {
+                    EXPECT_EQ(page.normal[s], old.normal[s]);
+                }
+                if (std::abs(step.norm() - 0.02F * spacing) > 1e-6F) {
+                    EXPECT_EQ(((fusion.moved >> s) & 1U) != 0,
+                              !noisy && step.norm() > 0.02F * spacing);
+                }
             }
-            if (std::abs(step.norm() - 0.02 * spacing) > 1e-6) {
-                EXPECT_EQ(((fusion.moved >> s) & 1U) != 0, !noisy && step.norm() > 0.02 * spacing);
+            if (matched) {
+                const float sigma =
+                    fusion.firstStays ? given.sigma[s]
+                                      : 1 / std::hypot(1 / std::max(given.sigma[s], kTinySigma),
+                                                       1 / std::max(points.sigma[i], kLeastSigma));
+                slowUpdate(points, claims, sigma, roundEdge, options, expected, s);
+                touched = touched || expected.open[s] != 0 || old.open[s] != 0;
             }
+            EXPECT_EQ(page.state[s], expected.state[s]);
+            EXPECT_EQ(page.open[s], expected.open[s]);
+            EXPECT_EQ(page.area[s], expected.area[s]);
+            area += compact::areaUnits(expected.area[s]) - compact::areaUnits(old.area[s]);
+            grown += expected.area[s] != old.area[s] ? 1 : 0;
         }
+        EXPECT_EQ(fusion.area, area);
+        EXPECT_EQ(fusion.touched, touched);
     }
     EXPECT_GT(fused, 200U);
     EXPECT_GT(turned, 20U);
+    EXPECT_GT(round, 5U);
+    EXPECT_GT(grown, 20U);
 }
 
 TEST(GraphKernels, ListedEdgesAreThoseBetweenDifferentVerticesNotBothNew) {
