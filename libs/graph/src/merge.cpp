@@ -58,7 +58,6 @@ MergeResult Merger::merge(const View& view, GraphStorage& storage, RiftFinder& r
 
     grow(storage, result);
     times_.grow = watch.lap();
-    connectNew(storage, result);
     connectMatched(storage, result);
     times_.edges = watch.lap();
     refreshNormals(storage);
@@ -303,39 +302,50 @@ void Merger::findFresh(const GraphStorage& storage, int strip) {
     }
 }
 
-void Merger::grow(GraphStorage& storage, MergeResult& result) {
-    const std::size_t n = points_.z.size();
-    const std::size_t behind = static_cast<std::size_t>(points_.width) + kEdgePadding;
-    vertexOf_.resize(n + behind, kNoVertex);
-    isFresh_.resize(n + behind, 0);
-    freshStrips_.resize(static_cast<std::size_t>((points_.height + kTile - 1) / kTile));
-    forEach(freshStrips_.size(), 2,
-            [&](std::size_t strip) { findFresh(storage, static_cast<int>(strip)); });
-    fresh_.clear();
-    freshIds_.clear();
-    for (const FreshStrip& strip : freshStrips_) {  // ids one after the other
-        fresh_.insert(fresh_.end(), strip.pixels.begin(), strip.pixels.end());
-        for (const auto& [key, count] : strip.runs) {
-            const std::uint32_t block = storage.blockAt(key);
-            touchedBlocks_.push_back(block);
-            storage.addVertices(block, count, freshIds_);
+/// Edges to neighbours that are new, too: right, below, left, above. Each new vertex is one pixel.
+/// Returns how many of them lead right or below.
+std::size_t Merger::connectFresh(Page& page, std::uint32_t slot, std::size_t i) const {
+    const auto w = static_cast<std::size_t>(points_.width);
+    page.neighbour[slot].fill(kNoVertex);
+    page.weight[slot].fill(0);
+    std::size_t n = 0;
+    const auto connect = [&](std::size_t j, std::uint16_t code) {
+        if (code != ViewPoints::kNoEdge && isFresh_[j] != 0) {
+            page.neighbour[slot][n] = vertexOf_[j];
+            page.weight[slot][n] = code;
+            ++n;
         }
+    };
+    connect(i + 1, points_.right[i]);
+    connect(i + w, points_.down[i]);
+    const std::size_t mine = n;
+    if (i % w > 0) {
+        connect(i - 1, points_.right[i - 1]);
     }
-    forEach(fresh_.size(), 512, [&](std::size_t f) {
-        const std::uint32_t pixel = fresh_[f];
-        const auto w = static_cast<std::uint32_t>(points_.width);
+    if (i >= w) {
+        connect(i - w, points_.down[i - w]);
+    }
+    return mine;
+}
+
+/// Writes the new vertices of a strip; all of `vertexOf_` must be known.
+void Merger::fillFresh(GraphStorage& storage, FreshStrip& strip) {
+    strip.edges = 0;
+    strip.area = 0;
+    strip.toFit.clear();
+    const auto w = static_cast<std::uint32_t>(points_.width);
+    for (const std::uint32_t pixel : strip.pixels) {
+        const VertexId id = vertexOf_[pixel];
         const int column = static_cast<int>(pixel % w), row = static_cast<int>(pixel / w);
-        const VertexId id = freshIds_[f];
-        vertexOf_[pixel] = id;
         Page& page = storage.page(GraphStorage::pageOf(id));
         const std::uint32_t slot = GraphStorage::slotOf(id);
-        page.clearSlot(slot);
         const Eigen::Vector3f p = points_.inMap(column, row);
         page.x[slot] = p.x();
         page.y[slot] = p.y();
         page.z[slot] = p.z();
         page.sigma[slot] = compact::Sigma::encode(std::max(points_.sigma[pixel], kLeastSigma));
         page.area[slot] = compact::Area::encode(points_.area[pixel]);
+        strip.area += compact::areaUnits(page.area[slot]);
         const std::uint32_t look = points_.look[pixel];
         page.rgb[slot] = {static_cast<std::uint8_t>(look), static_cast<std::uint8_t>(look >> 8U),
                           static_cast<std::uint8_t>(look >> 16U)};
@@ -344,8 +354,47 @@ void Merger::grow(GraphStorage& storage, MergeResult& result) {
                                                      (fine ? kFineEnough : 0));
         page.open[slot] = openBits(points_.kinds[pixel], page.state[slot],
                                    compact::Sigma::decode(page.sigma[slot]));
+        const bool noisy = points_.sigma[pixel] > kNoisy * points_.z[pixel] * points_.footprint;
+        if (!paper() && noisy && points_.onPatch(column, row)) {
+            page.normal[slot] =
+                compact::encodeDirection(points_.rotation * points_.patch(column, row).normal);
+        } else {
+            strip.toFit.push_back(id);  // once it has its edges
+        }
+        strip.edges += connectFresh(page, slot, pixel);
+    }
+}
+
+void Merger::grow(GraphStorage& storage, MergeResult& result) {
+    const std::size_t n = points_.z.size();
+    const std::size_t behind = static_cast<std::size_t>(points_.width) + kEdgePadding;
+    vertexOf_.resize(n + behind, kNoVertex);
+    isFresh_.resize(n + behind, 0);
+    freshStrips_.resize(static_cast<std::size_t>((points_.height + kTile - 1) / kTile));
+    forEach(freshStrips_.size(), 2,
+            [&](std::size_t strip) { findFresh(storage, static_cast<int>(strip)); });
+    freshIds_.clear();
+    for (FreshStrip& strip : freshStrips_) {  // ids one after the other
+        strip.first = freshIds_.size();
+        for (const auto& [key, count] : strip.runs) {
+            const std::uint32_t block = storage.blockAt(key);
+            touchedBlocks_.push_back(block);
+            storage.addVertices(block, count, freshIds_);
+        }
+    }
+    forEach(freshStrips_.size(), 2, [&](std::size_t s) {
+        const FreshStrip& strip = freshStrips_[s];
+        for (std::size_t f = 0; f < strip.pixels.size(); ++f) {
+            vertexOf_[strip.pixels[f]] = freshIds_[strip.first + f];
+        }
     });
-    result.newVertices = fresh_.size();
+    forEach(freshStrips_.size(), 1,
+            [&](std::size_t strip) { fillFresh(storage, freshStrips_[strip]); });
+    for (const FreshStrip& strip : freshStrips_) {
+        storage.countEdges(strip.edges);
+        result.newEdges += strip.edges;
+    }
+    result.newVertices = freshIds_.size();
 }
 
 void Merger::refreshNormals(GraphStorage& storage) {
@@ -353,18 +402,8 @@ void Merger::refreshNormals(GraphStorage& storage) {
         storage.page(GraphStorage::pageOf(id)).normal[GraphStorage::slotOf(id)] =
             compact::encodeDirection(planeNormal(storage, id, points_.translation, paper()));
     };
-    forEach(fresh_.size(), 512, [&](std::size_t f) {
-        const std::uint32_t pixel = fresh_[f];
-        const auto w = static_cast<std::uint32_t>(points_.width);
-        const int column = static_cast<int>(pixel % w), row = static_cast<int>(pixel / w);
-        const bool noisy = points_.sigma[pixel] > kNoisy * points_.z[pixel] * points_.footprint;
-        const VertexId id = vertexOf_[pixel];
-        if (!paper() && noisy && points_.onPatch(column, row)) {
-            storage.page(GraphStorage::pageOf(id)).normal[GraphStorage::slotOf(id)] =
-                compact::encodeDirection(points_.rotation * points_.patch(column, row).normal);
-        } else {
-            fit(id);
-        }
+    forEach(freshStrips_.size(), 1, [&](std::size_t strip) {
+        std::for_each(freshStrips_[strip].toFit.begin(), freshStrips_[strip].toFit.end(), fit);
     });
     forEach(work_.size(), kPagesAtOnce, [&](std::size_t i) {
         const std::uint32_t index = seen_.pages[i];
@@ -389,18 +428,9 @@ void Merger::finish(GraphStorage& storage, RiftFinder& rifts, std::int64_t& area
     for (const PageWork& work : work_) {
         area += work.area;
     }
-    area += parallelReduce(
-        freshIds_.size(), 4096, std::int64_t{0},
-        [&](std::size_t begin, std::size_t end) {
-            std::int64_t sum = 0;
-            for (std::size_t f = begin; f != end; ++f) {
-                const VertexId id = freshIds_[f];
-                sum += compact::areaUnits(
-                    storage.page(GraphStorage::pageOf(id)).area[GraphStorage::slotOf(id)]);
-            }
-            return sum;
-        },
-        [](std::int64_t a, std::int64_t b) { return a + b; });
+    for (const FreshStrip& strip : freshStrips_) {
+        area += strip.area;
+    }
     freshPages_.clear();
     for (const VertexId id : freshIds_) {
         const std::uint32_t index = GraphStorage::pageOf(id);
@@ -429,10 +459,10 @@ void Merger::finish(GraphStorage& storage, RiftFinder& rifts, std::int64_t& area
 
 std::size_t Merger::memoryBytes() const {
     std::size_t bytes = points_.memoryBytes() + seen_.memoryBytes() + bytesOf(work_) +
-                        bytesOf(vertexOf_) + bytesOf(fresh_) + bytesOf(freshIds_) +
-                        bytesOf(isFresh_) + bytesOf(touchedBlocks_) + bytesOf(freshPages_);
+                        bytesOf(vertexOf_) + bytesOf(freshIds_) + bytesOf(isFresh_) +
+                        bytesOf(touchedBlocks_) + bytesOf(freshPages_);
     for (const FreshStrip& strip : freshStrips_) {
-        bytes += bytesOf(strip.pixels) + bytesOf(strip.runs);
+        bytes += bytesOf(strip.pixels) + bytesOf(strip.runs) + bytesOf(strip.toFit);
     }
     for (const auto& strip : missingEdges_) {
         bytes += bytesOf(strip);

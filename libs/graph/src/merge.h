@@ -58,6 +58,10 @@ class Merger {
         std::vector<std::uint32_t> pixels;  ///< that become vertices
         /// The blocks of these pixels: key, how many in a row.
         std::vector<std::pair<BlockKey, std::uint32_t>> runs;
+        std::size_t first = 0;        ///< of its vertices in freshIds_
+        std::size_t edges = 0;        ///< between new vertices
+        std::int64_t area = 0;        ///< [compact::areaUnits]
+        std::vector<VertexId> toFit;  ///< vertices whose normal comes from their neighbours
     };
     /// What compareEdges() works on; one a thread, only the first so many elements count.
     struct EdgeScratch {
@@ -90,7 +94,8 @@ class Merger {
     void deleteSeenThrough(GraphStorage& storage, RiftFinder& rifts, MergeResult& result);
     void grow(GraphStorage& storage, MergeResult& result);
     void findFresh(const GraphStorage& storage, int strip);
-    void connectNew(GraphStorage& storage, MergeResult& result);
+    std::size_t connectFresh(Page& page, std::uint32_t slot, std::size_t i) const;
+    void fillFresh(GraphStorage& storage, FreshStrip& strip);
     void connectMatched(GraphStorage& storage, MergeResult& result);
     void compareEdges(GraphStorage& storage, int strip);
     bool wanted(const GraphStorage& storage, const NewEdge& edge) const;
@@ -112,8 +117,7 @@ class Merger {
     Association seen_;
     std::vector<PageWork> work_;         ///< beside seen_.pages
     std::vector<VertexId> vertexOf_;     ///< pixel -> vertex that it shows
-    std::vector<std::uint32_t> fresh_;   ///< pixels that became vertices
-    std::vector<VertexId> freshIds_;     ///< beside fresh_
+    std::vector<VertexId> freshIds_;     ///< of the pixels that became vertices, strip by strip
     std::vector<std::uint8_t> isFresh_;  ///< pixel -> became a vertex
     std::vector<std::uint32_t> touchedBlocks_;
     std::vector<std::uint32_t> freshPages_;

@@ -18,43 +18,6 @@ constexpr int kRowsAtOnce = 8;
 
 }  // namespace
 
-void Merger::connectNew(GraphStorage& storage, MergeResult& result) {
-    // Each new vertex is one pixel and writes its own half-edges to other new ones.
-    const auto w = static_cast<std::size_t>(points_.width);
-    const auto connectPixel = [&](std::size_t i) {
-        const VertexId id = vertexOf_[i];
-        const auto connect = [&](std::size_t j, std::uint16_t code) {
-            if (code != ViewPoints::kNoEdge && isFresh_[j] != 0) {
-                storage.appendInline(id, vertexOf_[j], code);
-                return true;
-            }
-            return false;
-        };
-        std::size_t mine = 0;
-        mine += connect(i + 1, points_.right[i]) ? 1U : 0U;
-        mine += connect(i + w, points_.down[i]) ? 1U : 0U;
-        if (i % w > 0) {
-            connect(i - 1, points_.right[i - 1]);
-        }
-        if (i >= w) {
-            connect(i - w, points_.down[i - w]);
-        }
-        return mine;
-    };
-    const std::size_t added = parallelReduce(
-        fresh_.size(), 1024, std::size_t{0},
-        [&](std::size_t begin, std::size_t end) {
-            std::size_t sum = 0;
-            for (std::size_t f = begin; f != end; ++f) {
-                sum += connectPixel(fresh_[f]);
-            }
-            return sum;
-        },
-        [](std::size_t a, std::size_t b) { return a + b; });
-    storage.countEdges(added);
-    result.newEdges += added;
-}
-
 bool Merger::wanted(const GraphStorage& storage, const NewEdge& e) const {
     if (paper()) {
         return true;

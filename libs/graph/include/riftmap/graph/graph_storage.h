@@ -249,8 +249,6 @@ class GraphStorage {
     bool fullInline(VertexId id) const {
         return page(pageOf(id)).neighbour[slotOf(id)][Page::kInline - 1] != kNoVertex;
     }
-    /// Appends b to a's list, which must have an inline slot free (parallel).
-    void appendInline(VertexId a, VertexId b, std::uint16_t weight);
     /// Appends both half-edges; the edge must not exist.
     void addEdge(VertexId a, VertexId b, std::uint16_t weight);
     /// Replaces a's list of half-edges (for loading).
@@ -301,7 +299,7 @@ class GraphStorage {
     std::size_t memoryBytes() const;
     std::size_t vertexCount() const { return vertexCount_; }
     std::size_t edgeCount() const { return edgeCount_; }
-    /// Counts of edges made by appendInline, which leaves the counting to its caller.
+    /// Counts edges that were written to the pages of their new vertices.
     void countEdges(std::size_t added) { edgeCount_ += added; }
 
     /// For loading: makes pages up to this index exist, dead and without a block.
@@ -327,6 +325,7 @@ class GraphStorage {
     };
 
     std::uint16_t* findInChunks(std::uint32_t first, VertexId b);
+    void appendInline(VertexId a, VertexId b, std::uint16_t weight);
     void appendHalfEdge(VertexId a, VertexId b, std::uint16_t weight);
     bool removeHalfEdge(VertexId a, VertexId b);
     std::uint32_t newEdgeChunk();

@@ -77,8 +77,8 @@ struct MergeTimes {
     double points = 0;     ///< eqs. (1)-(3), patches
     double associate = 0;  ///< cull, project, match
     double fuse = 0;       ///< visibility, fusion, deletion
-    double grow = 0;       ///< new vertices
-    double edges = 0;
+    double grow = 0;       ///< new vertices and the edges between them
+    double edges = 0;      ///< all others
     double normals = 0;
 };
 
