@@ -105,25 +105,23 @@ GraphStorage::PageChunk GraphStorage::newChunk(bool large) {
     return chunk;
 }
 
-/// The first touch of fresh memory costs more than filling it: up to 5 ms for a chunk where a
-/// virtual machine has to be given it first. So once a chunk is little beside the map, the next one
-/// is touched by another thread while the last one fills.
 GraphStorage::PageChunk GraphStorage::takeChunk() {
-    constexpr std::size_t kSmallMap = 64;  // chunks
-    PageChunk chunk =
-        nextChunk_.valid() ? nextChunk_.get() : newChunk(!chunks_.empty());  // 2 MB are not little
-    if (chunks_.size() >= kSmallMap) {
-        nextChunk_ = std::async(std::launch::async | std::launch::deferred, [] {
-            PageChunk next = newChunk(true);
-            auto* bytes = reinterpret_cast<volatile char*>(next.get());
-            constexpr std::size_t kSystemPage = 4096;
-            for (std::size_t i = 0; i < kChunkBytes; i += kSystemPage) {
-                bytes[i] = 0;
-            }
-            return next;
-        });
+    return nextChunk_ ? std::move(nextChunk_) : newChunk(!chunks_.empty());  // 2 MB are not little
+}
+
+/// The first touch of fresh memory costs more than filling it: up to 5 ms for a chunk where a
+/// virtual machine has to be given it first.
+void GraphStorage::prepareChunk() {
+    constexpr std::size_t kSmallMap = 64;  // chunks, beside which another one is little
+    if (nextChunk_ || chunks_.size() <= kSmallMap) {
+        return;
     }
-    return chunk;
+    nextChunk_ = newChunk(true);
+    auto* bytes = reinterpret_cast<volatile char*>(nextChunk_.get());
+    constexpr std::size_t kSystemPage = 4096;
+    for (std::size_t i = 0; i < kChunkBytes; i += kSystemPage) {
+        bytes[i] = 0;
+    }
 }
 
 void GraphStorage::reservePages(std::uint32_t count) {
@@ -380,7 +378,7 @@ std::size_t GraphStorage::memoryBytes() const {
     std::size_t bytes =
         // the first chunk is resident as far as it is used
         (chunks_.size() <= 1 ? pageCount_ * sizeof(Page) : chunks_.size() * kChunkBytes) +
-        (nextChunk_.valid() ? kChunkBytes : 0) + chunks_.capacity() * sizeof(chunks_[0]) +
+        (nextChunk_ ? kChunkBytes : 0) + chunks_.capacity() * sizeof(chunks_[0]) +
         freePages_.capacity() * sizeof(std::uint32_t) + blocks_.capacity() * sizeof(Block) +
         edgePieces_.size() * sizeof(EdgePiece) +
         // a node and a bucket an entry, as libstdc++ has them

@@ -84,8 +84,14 @@ void Merger::compareEdges(GraphStorage& storage, int strip) {
 void Merger::connectMatched(GraphStorage& storage, MergeResult& result) {
     missingEdges_.resize((static_cast<std::size_t>(points_.height) + kRowsAtOnce - 1) /
                          kRowsAtOnce);
-    forEach(missingEdges_.size(), 1,
-            [&](std::size_t strip) { compareEdges(storage, static_cast<int>(strip)); });
+    // One thread begins with memory for the vertices of later views.
+    forEach(missingEdges_.size() + 1, 1, [&](std::size_t i) {
+        if (i == 0) {
+            storage.prepareChunk();
+        } else {
+            compareEdges(storage, static_cast<int>(i) - 1);
+        }
+    });
     for (const auto& strip : missingEdges_) {
         for (const NewEdge& e : strip) {
             if (std::uint16_t* there = storage.findHalfEdge(e.a, e.b)) {

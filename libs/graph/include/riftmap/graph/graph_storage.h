@@ -11,7 +11,6 @@
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
-#include <future>
 #include <limits>
 #include <memory>
 #include <unordered_map>
@@ -199,6 +198,9 @@ class GraphStorage {
     VertexId addVertex(std::uint32_t block);
     /// Appends the ids of `count` living vertices; the caller clears their slots, too.
     void addVertices(std::uint32_t block, std::uint32_t count, std::vector<VertexId>& ids);
+    /// Makes the next piece of memory ready that new vertices will ask for. Takes long: to be run
+    /// beside what only reads vertices and writes to weights.
+    void prepareChunk();
     /// Deletes a vertex with its edges.
     void removeVertex(VertexId id);
     /// Of the living vertices of a page. Apart from the pages, so that culling reads little.
@@ -338,10 +340,10 @@ class GraphStorage {
     }
 
     double blockSize_;
-    float levelScale_;                  ///< levelOf()
-    std::int32_t levels_ = 0;           ///< in use: above the highest
-    std::vector<PageChunk> chunks_;     ///< kPagesPerChunk pages each
-    std::future<PageChunk> nextChunk_;  ///< being made ready while the last one fills
+    float levelScale_;               ///< levelOf()
+    std::int32_t levels_ = 0;        ///< in use: above the highest
+    std::vector<PageChunk> chunks_;  ///< kPagesPerChunk pages each
+    PageChunk nextChunk_;            ///< prepareChunk()
     std::uint32_t pageCount_ = 0;
     std::vector<PageBounds> bounds_;        ///< of pages
     std::vector<std::uint32_t> freePages_;  ///< a heap, smallest on top: as after loading
