@@ -110,9 +110,11 @@ AstarComparison compareAstar(const PixelGraph& graph, std::size_t pairs, std::si
         const VertexId a = ids[random() % ids.size()];
         const VertexId b = ids[random() % ids.size()];
         const auto path = own.shortestPath(graph, a, b);
+        const std::size_t expansions = own.expanded();
         const double length = boost.length(a, b);
         if (path && std::isfinite(length)) {
             ends.emplace_back(a, b);
+            result.ownExpansions += static_cast<double>(expansions);
             result.largestDifference =
                 std::max(result.largestDifference, std::abs(path->length - length) / length);
         } else {
@@ -155,6 +157,7 @@ AstarComparison compareAstar(const PixelGraph& graph, std::size_t pairs, std::si
         boostOfPair.push_back(median(boostMs[i]));
         ratioOfPair.push_back(boostOfPair.back() / ownOfPair.back());
     }
+    result.ownExpansions /= static_cast<double>(std::max<std::size_t>(1, ends.size()));
     result.searches = ends.size() * turns;
     result.ownMs = median(ownOfPair);
     result.boostMs = median(boostOfPair);

@@ -9,6 +9,7 @@ namespace riftmap {
 
 struct AstarComparison {
     double ownMs = 0, boostMs = 0;           ///< medians over pairs of the medians over turns
+    double ownExpansions = 0;                ///< mean of our searches
     double ratio = 0;                        ///< median over pairs of Boost's time over ours
     double lowestTurn = 0, highestTurn = 0;  ///< Boost's time over ours, all pairs of one turn
     double largestDifference = 0;            ///< of the lengths found, relative

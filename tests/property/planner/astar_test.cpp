@@ -5,7 +5,11 @@
 
 #include <boost/graph/adjacency_list.hpp>
 #include <boost/graph/dijkstra_shortest_paths.hpp>
+#include <cmath>
+#include <limits>
+#include <queue>
 #include <random>
+#include <tuple>
 
 namespace riftmap {
 namespace {
@@ -143,6 +147,185 @@ TEST(GraphSearch, distancesEqualBoostToAllTargets) {
                 EXPECT_NEAR(distance[i], expected, 1e-9);
             }
         }
+    }
+}
+
+/// A lattice whose points lie `spacing` apart, but for `shift` of them on the one before, so that
+/// edges of length 0 arise; joined to the right and upwards by weights from `weight`.
+template <class Weight>
+TestGraph lattice(VertexId side, float spacing, double shift, std::mt19937& random,
+                  const Weight& weight) {
+    TestGraph g;
+    std::bernoulli_distribution moves(shift);
+    for (VertexId i = 0; i < side * side; ++i) {
+        const float x = spacing * static_cast<float>(i % side);
+        const float y = spacing * static_cast<float>(i / side);
+        g.points.emplace_back(x, y, 0.0F);
+        if (i % side > 0 && moves(random)) {
+            g.points.back() = g.points[i - 1];
+        }
+    }
+    g.edges.resize(g.points.size());
+    for (VertexId i = 0; i < side * side; ++i) {
+        const auto join = [&](VertexId to) {
+            const float w = weight();
+            g.edges[i].push_back({to, w});
+            g.edges[to].push_back({i, w});
+        };
+        if (i % side + 1 < side) {
+            join(i + 1);
+        }
+        if (i + side < side * side) {
+            join(i + side);
+        }
+    }
+    return g;
+}
+
+/// The slow reference: strictly by the smallest distance, no heuristic, to the end. Its lengths
+/// are the sums that the search has to give, to the last bit.
+struct StrictSearch {
+    std::vector<double> distance;
+
+    StrictSearch(const TestGraph& g, VertexId source)
+        : distance(g.points.size(), std::numeric_limits<double>::infinity()) {
+        using Entry = std::pair<double, VertexId>;
+        std::priority_queue<Entry, std::vector<Entry>, std::greater<>> heap;
+        distance[source] = 0;
+        heap.push({0, source});
+        while (!heap.empty()) {
+            const auto [key, id] = heap.top();
+            heap.pop();
+            if (key > distance[id]) {
+                continue;
+            }
+            for (const auto& e : g.edges[id]) {
+                if (const double d = key + stepOf(g, id, e); d < distance[e.to]) {
+                    distance[e.to] = d;
+                    heap.push({d, e.to});
+                }
+            }
+        }
+    }
+
+    static double stepOf(const TestGraph& g, VertexId from, const TestGraph::Edge& e) {
+        const Eigen::Vector3f& p = g.points[from];
+        const Eigen::Vector3f& q = g.points[e.to];
+        const double x = double{p.x()} - q.x(), y = double{p.y()} - q.y(),
+                     z = double{p.z()} - q.z();
+        return std::max(static_cast<double>(e.weight), std::sqrt(x * x + y * y + z * z));
+    }
+
+    /// Of the vertices by which `id` is reached soonest, and that are nearer, the smallest.
+    VertexId before(const TestGraph& g, VertexId id) const {
+        VertexId least = kNoVertex;
+        for (const auto& e : g.edges[id]) {
+            const double d = distance[e.to] + stepOf(g, e.to, {id, e.weight});
+            if (d == distance[id] && distance[e.to] < distance[id]) {
+                least = std::min(least, e.to);
+            }
+        }
+        return least;
+    }
+};
+
+TEST(GraphSearch, equalsTheStrictSearchToTheLastBitWhateverTheWeights) {
+    const unsigned seed = std::random_device{}();
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<float> unit(0, 1);
+    const auto equal = [] { return 1.0F; };           // nothing but ties
+    const auto below = [&] { return unit(random); };  // below the straight distance
+    const auto longer = [&] { return 1.0F + 3.0F * unit(random); };
+    const auto torn = [&] {  // a few edges as across a tear, among tiny ones and zeros
+        const float u = unit(random);
+        return u < 0.02F ? 1e4F * u : u < 0.2F ? 0.0F : 1e-3F * u;
+    };
+    const auto scales = [&] { return std::pow(10.0F, 8.0F * unit(random) - 6.0F); };
+    GraphSearch search;
+    int zeroEdges = 0, compared = 0;
+    for (int round = 0; round < 20; ++round) {
+        const VertexId side = 10 + 3 * static_cast<VertexId>(round);
+        const double shift = round % 2 == 0 ? 0.0 : 0.2;
+        for (const TestGraph& g :
+             {lattice(side, 1.0F, shift, random, equal), lattice(side, 1.0F, shift, random, below),
+              lattice(side, 1.0F, shift, random, longer), lattice(side, 1e-3F, shift, random, torn),
+              lattice(side, 0.0F, 0.0, random, torn), lattice(side, 1e-4F, shift, random, scales),
+              randomGraph(random, side * side)}) {
+            std::uniform_int_distribution<VertexId> any(0, g.idLimit() - 1);
+            const VertexId source = any(random);
+            const StrictSearch reference(g, source);
+            std::vector<VertexId> targets;
+            for (int i = 0; i < 5; ++i) {
+                const VertexId goal = targets.emplace_back(any(random));
+                const auto path = search.shortestPath(g, source, goal);
+                ASSERT_EQ(path.has_value(), std::isfinite(reference.distance[goal]));
+                if (!path) {
+                    continue;
+                }
+                ++compared;
+                ASSERT_EQ(path->length, reference.distance[goal]);
+                ASSERT_EQ(path->vertices.front(), source);
+                for (std::size_t k = 1; k < path->vertices.size(); ++k) {
+                    const VertexId from = path->vertices[k - 1], to = path->vertices[k];
+                    if (reference.distance[from] == reference.distance[to]) {
+                        ++zeroEdges;  // there the order of expansion decides
+                    } else {
+                        ASSERT_EQ(from, reference.before(g, to));
+                    }
+                }
+            }
+            const std::vector<double> distance = search.distances(g, source, targets);
+            for (std::size_t i = 0; i < targets.size(); ++i) {
+                ASSERT_EQ(distance[i], reference.distance[targets[i]]);
+            }
+        }
+    }
+    EXPECT_GT(compared, 500);
+    EXPECT_GT(zeroEdges, 100);
+}
+
+TEST(BucketQueue, givesAllKeysAndNoSmallerOneAfterABucket) {
+    const unsigned seed = std::random_device{}();
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> unit(0, 1);
+    BucketQueue queue;  // one for all
+    for (int round = 0; round < 60; ++round) {
+        queue.clear();
+        std::vector<double> keys;  // by id
+        const double farAway = std::pow(10.0, 12 * unit(random) - 2);
+        const auto push = [&](double base) {
+            const double u = unit(random);
+            keys.push_back(u < 0.3    ? base  // equal keys
+                           : u < 0.31 ? base + farAway
+                                      : base + unit(random));
+            queue.push(keys.back(), static_cast<VertexId>(keys.size() - 1));
+        };
+        const double start = round % 3 == 0 ? 0.0 : 100 * unit(random);
+        for (int i = 0; i < 1 + 300 * (round % 4); ++i) {
+            push(start);
+        }
+        std::size_t taken = 0, buckets = 0;
+        double largest = 0;  // of the buckets left
+        while (queue.advance()) {
+            ++buckets;
+            double here = largest;
+            ASSERT_FALSE(queue.bucket().empty());
+            ASSERT_GE(queue.floor() * (1 + 1e-12), largest);
+            for (std::size_t i = 0; i < queue.bucket().size(); ++i) {
+                const double key = keys[queue.bucket()[i]];
+                ASSERT_GE(key * (1 + 1e-12), queue.floor());
+                here = std::max(here, key);
+                ++taken;
+                if (keys.size() < 20000) {
+                    push(key);
+                }
+            }
+            largest = here;
+        }
+        EXPECT_EQ(taken, keys.size());
+        EXPECT_GT(buckets, 20U);  // one for all were no order at all
     }
 }
 

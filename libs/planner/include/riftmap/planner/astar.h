@@ -3,6 +3,8 @@
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <optional>
@@ -12,8 +14,50 @@
 #include <vector>
 
 #include "riftmap/graph/pixel_graph.h"
+#include "riftmap/planner/bucket_queue.h"
 
 namespace riftmap {
+
+/// Has a line of memory on its way while other work goes on. GCC takes functions that do nothing
+/// else for without effect and drops their calls; the empty instruction keeps them.
+inline void fetchLine(const void* address) {
+    __builtin_prefetch(address);
+    asm volatile("");
+}
+
+/// A PixelGraph as searches read it: its arrays, without a call through its private part for each
+/// vertex. Valid while nothing writes to the graph.
+class PixelGraphReader {
+ public:
+    explicit PixelGraphReader(const PixelGraph& graph)
+        : storage_(graph.storage()), idLimit_(graph.idLimit()) {}
+    VertexId idLimit() const { return idLimit_; }
+    Eigen::Vector3f position(VertexId id) const { return storage_.position(id); }
+    template <class F>
+    void forEachEdge(VertexId id, F&& f) const {
+        storage_.forEachHalfEdge(
+            id, [&f](VertexId to, std::uint16_t code) { f(to, compact::weightOf(code)); });
+    }
+    /// Ask for the lines that position(id) and forEachEdge(id, ...) will read.
+    void fetchPosition(VertexId id) const {
+        const Page& page = storage_.page(GraphStorage::pageOf(id));
+        const std::uint32_t slot = GraphStorage::slotOf(id);
+        fetchLine(&page.x[slot]);
+        fetchLine(&page.y[slot]);
+        fetchLine(&page.z[slot]);
+    }
+    void fetchEdges(VertexId id) const {
+        const Page& page = storage_.page(GraphStorage::pageOf(id));
+        const std::uint32_t slot = GraphStorage::slotOf(id);
+        fetchLine(&page.neighbour[slot]);
+        fetchLine(&page.weight[slot]);
+        fetchLine(&page.state[slot]);
+    }
+
+ private:
+    const GraphStorage& storage_;
+    VertexId idLimit_;
+};
 
 /// A way through the graph.
 struct GraphPath {
@@ -31,27 +75,24 @@ struct GraphPath {
 ///
 /// The length of an edge is its weight, but never less than the straight distance of its ends as
 /// they lie now: weights are the smallest ever observed, and fusion moves vertices on. With that
-/// the straight line to the goal is a consistent heuristic on merged maps too, so the path is the
-/// shortest one and each vertex is expanded once. Equal lengths are broken by the smaller id, so
-/// the result does not depend on anything but the graph. An object serves one thread.
+/// the straight line to the goal is a consistent heuristic on merged maps too, so no vertex is
+/// nearer than the one the search has come to.
+///
+/// Vertices are expanded by buckets of about equal keys, and once more if an edge shorter than the
+/// bucket is wide makes them nearer; the search ends after the bucket of the last target. So the
+/// distances are those of a search in strict order, to the last bit. Among ways of equal length
+/// the path comes, from each of its vertices, from the one with the smallest id, so that it does
+/// not depend on anything but the graph (only edges of length 0 go by the order of expansion,
+/// which is fixed). An object serves one thread.
 class GraphSearch {
  public:
     /// A* from `source` to `goal`; nothing if there is no way. Both must be alive.
     template <class Graph>
     std::optional<GraphPath> shortestPath(const Graph& graph, VertexId source, VertexId goal) {
-        const Eigen::Vector3d end = graph.position(goal).template cast<double>();
-        const auto straight = [&end](const Eigen::Vector3d& p) { return (p - end).norm(); };
-        begin(graph.idLimit(), source, straight(graph.position(source).template cast<double>()));
-        while (!heap_.empty()) {
-            const VertexId id = pop();
-            if (id == goal) {
-                return trace(source, goal);
-            }
-            if (id != kNoVertex) {
-                relaxEdges(graph, id, straight);
-            }
-        }
-        return std::nullopt;
+        const Point end = pointOf(graph, goal);
+        search(readerOf(graph), source, {goal},
+               [&end](const Point& p) { return distanceOf(p, end); });
+        return met(nodes_[goal]) ? std::optional<GraphPath>(trace(source, goal)) : std::nullopt;
     }
 
     /// Distance [m] from `source` to each target; infinite where there is no way. Ends when the
@@ -59,49 +100,52 @@ class GraphSearch {
     template <class Graph>
     std::vector<double> distances(const Graph& graph, VertexId source,
                                   const std::vector<VertexId>& targets) {
-        begin(graph.idLimit(), source, 0.0);
-        const auto none = [](const Eigen::Vector3d&) { return 0.0; };
-        std::vector<VertexId> left = targets;
-        std::sort(left.begin(), left.end());
-        left.erase(std::unique(left.begin(), left.end()), left.end());
-        std::size_t missing = left.size();
-        while (!heap_.empty() && missing > 0) {
-            const VertexId id = pop();
-            if (id == kNoVertex) {
-                continue;
-            }
-            missing -= std::binary_search(left.begin(), left.end(), id) ? 1 : 0;
-            relaxEdges(graph, id, none);
-        }
+        search(readerOf(graph), source, targets, [](const Point&) { return 0.0; });
         std::vector<double> result;
         result.reserve(targets.size());
         for (const VertexId id : targets) {
-            result.push_back(nodes_[id].stamp == closedStamp()
-                                 ? nodes_[id].distance
-                                 : std::numeric_limits<double>::infinity());
+            result.push_back(distanceOf(nodes_[id]));
         }
         return result;
     }
 
-    /// Vertices taken off the heap for good by the last search.
+    /// Expansions of the last search: vertices it came to, and again where it had to.
     std::size_t expanded() const { return expanded_; }
 
  private:
     struct Node {
         double distance;  ///< from the source [m]
         VertexId parent;
-        std::uint32_t stamp;  ///< 2 search = open, 2 search + 1 = closed, else not met yet
+        std::uint32_t stamp;  ///< 2 search = to be expanded, 2 search + 1 = done, less = not met
     };
-    struct Entry {
-        double key;  ///< distance + heuristic [m]
-        VertexId id;
-        bool operator<(const Entry& b) const { return key < b.key || (key == b.key && id < b.id); }
+    struct Point {
+        double x, y, z;
     };
+
+    template <class Graph>
+    static const Graph& readerOf(const Graph& graph) {
+        return graph;
+    }
+    static PixelGraphReader readerOf(const PixelGraph& graph) { return PixelGraphReader(graph); }
+
+    template <class Graph>
+    static Point pointOf(const Graph& graph, VertexId id) {
+        const Eigen::Vector3f p = graph.position(id);
+        return {p.x(), p.y(), p.z()};
+    }
+    static double distanceOf(const Point& a, const Point& b) {
+        const double x = a.x - b.x, y = a.y - b.y, z = a.z - b.z;
+        return std::sqrt(x * x + y * y + z * z);
+    }
 
     std::uint32_t openStamp() const { return 2 * search_; }
     std::uint32_t closedStamp() const { return 2 * search_ + 1; }
+    bool met(const Node& node) const { return node.stamp >= openStamp(); }
+    double distanceOf(const Node& node) const {
+        return met(node) ? node.distance : std::numeric_limits<double>::infinity();
+    }
 
-    void begin(VertexId idLimit, VertexId source, double key) {
+    void begin(VertexId idLimit, VertexId source) {
         if (source >= idLimit) {
             throw std::invalid_argument("path search from vertex " + std::to_string(source) +
                                         ", but the graph has ids below " + std::to_string(idLimit));
@@ -113,83 +157,87 @@ class GraphSearch {
             std::fill(nodes_.begin(), nodes_.end(), Node{0.0, kNoVertex, 0});
             search_ = 1;
         }
-        heap_.clear();
+        queue_.clear();
         expanded_ = 0;
         nodes_[source] = {0.0, kNoVertex, openStamp()};
-        push({key, source});
     }
 
-    /// The open vertex with the smallest key, now closed; kNoVertex if the entry was outdated.
-    VertexId pop() {
-        const VertexId id = heap_.front().id;
-        const Entry last = heap_.back();
-        heap_.pop_back();
-        if (!heap_.empty()) {
-            siftDown(last);
+    /// Until the distances of all targets are known, or nothing is left. `heuristic` of a target
+    /// is 0.
+    template <class Graph, class Heuristic>
+    void search(const Graph& graph, VertexId source, std::vector<VertexId> targets,
+                const Heuristic& heuristic) {
+        begin(graph.idLimit(), source);
+        queue_.push(heuristic(pointOf(graph, source)), source);
+        while (queue_.advance() && !reached(targets)) {
+            expandBucket(graph, heuristic);
         }
-        Node& node = nodes_[id];
-        if (node.stamp == closedStamp()) {
-            return kNoVertex;
+    }
+
+    /// Takes targets away whose distance no key to come can shorten. Keys on the way to a target
+    /// exceed its distance by rounding at most.
+    bool reached(std::vector<VertexId>& targets) const {
+        constexpr double kRounding = 1 + 1e-9;
+        while (!targets.empty() &&
+               distanceOf(nodes_[targets.back()]) * kRounding < queue_.floor()) {
+            targets.pop_back();
         }
-        node.stamp = closedStamp();
-        ++expanded_;
-        return id;
+        return targets.empty();
+    }
+
+    template <class Graph, class Heuristic>
+    void expandBucket(const Graph& graph, const Heuristic& heuristic) {
+        const std::vector<VertexId>& bucket = queue_.bucket();
+        for (std::size_t i = 0; i < bucket.size(); ++i) {
+            fetchAhead(graph, bucket, i);
+            Node& node = nodes_[bucket[i]];
+            if (node.stamp == openStamp()) {  // else expanded since, by a smaller key
+                node.stamp = closedStamp();
+                ++expanded_;
+                relaxEdges(graph, bucket[i], heuristic);
+            }
+        }
     }
 
     template <class Graph, class Heuristic>
     void relaxEdges(const Graph& graph, VertexId id, const Heuristic& heuristic) {
         const double base = nodes_[id].distance;
-        const Eigen::Vector3d here = graph.position(id).template cast<double>();
+        const Point here = pointOf(graph, id);
         graph.forEachEdge(id, [&](VertexId to, float weight) {
             Node& node = nodes_[to];
             const double least = base + static_cast<double>(weight);
-            if (node.stamp == closedStamp() ||
-                (node.stamp == openStamp() && !(least < node.distance))) {
+            if (met(node) && !(least <= node.distance)) {
                 return;
             }
-            const Eigen::Vector3d there = graph.position(to).template cast<double>();
-            const double distance = std::max(least, base + (there - here).norm());
-            if (node.stamp != openStamp() || distance < node.distance) {
+            const Point there = pointOf(graph, to);
+            const double distance = std::max(least, base + distanceOf(here, there));
+            if (!met(node) || distance < node.distance) {
                 node = {distance, id, openStamp()};
-                push({distance + heuristic(there), to});
+                queue_.push(distance + heuristic(there), to);
+            } else if (distance == node.distance && base < distance && id < node.parent) {
+                node.parent = id;
             }
         });
     }
 
-    // A heap of four children a node: half the levels of a binary one, and the children share a
-    // cache line or two.
-    void push(const Entry& entry) {
-        std::size_t i = heap_.size();
-        heap_.push_back(entry);
-        while (i > 0) {
-            const std::size_t parent = (i - 1) / 4;
-            if (!(entry < heap_[parent])) {
-                break;
+    /// What the bucket's next vertices need is on its way from memory while this one is worked on:
+    /// first their own data, then, when that tells who they are, their neighbours'.
+    template <class Graph>
+    void fetchAhead(const Graph& graph, const std::vector<VertexId>& bucket, std::size_t i) const {
+        if constexpr (requires { graph.fetchEdges(VertexId{}); }) {
+            if (i + kFetchVertex < bucket.size()) {
+                const VertexId id = bucket[i + kFetchVertex];
+                fetchLine(&nodes_[id]);
+                graph.fetchEdges(id);
+                graph.fetchPosition(id);
             }
-            heap_[i] = heap_[parent];
-            i = parent;
+            if (i + kFetchNeighbours < bucket.size()) {
+                graph.forEachEdge(bucket[i + kFetchNeighbours], [&](VertexId to, float /*weight*/) {
+                    fetchLine(&nodes_[to]);
+                    graph.fetchPosition(to);
+                });
+            }
         }
-        heap_[i] = entry;
-    }
-    void siftDown(const Entry& entry) {
-        const std::size_t n = heap_.size();
-        std::size_t i = 0;
-        for (;;) {
-            const std::size_t first = 4 * i + 1;
-            if (first >= n) {
-                break;
-            }
-            std::size_t least = first;
-            for (std::size_t c = first + 1; c < std::min(first + 4, n); ++c) {
-                least = heap_[c] < heap_[least] ? c : least;
-            }
-            if (!(heap_[least] < entry)) {
-                break;
-            }
-            heap_[i] = heap_[least];
-            i = least;
-        }
-        heap_[i] = entry;
     }
 
     GraphPath trace(VertexId source, VertexId goal) const {
@@ -204,9 +252,10 @@ class GraphSearch {
     }
 
     static constexpr std::uint32_t kLastSearch = 0x7FFFFFFFU;
+    static constexpr std::size_t kFetchVertex = 16, kFetchNeighbours = 8;  ///< expansions ahead
 
     std::vector<Node> nodes_;  ///< by vertex id
-    std::vector<Entry> heap_;
+    BucketQueue queue_;
     std::uint32_t search_ = 0;
     std::size_t expanded_ = 0;
 };
