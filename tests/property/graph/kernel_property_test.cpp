@@ -5,6 +5,7 @@
 #include <hwy/targets.h>
 
 #include <cmath>
+#include <limits>
 #include <map>
 #include <set>
 #include <sstream>
@@ -172,7 +173,20 @@ TEST(GraphKernels, PatchesAreLeastSquaresPlanes) {
     EXPECT_GT(none, 20U);
 }
 
+/// How far a pixel lies, along the axis, from the plane of a neighbour's patch that is seen at an
+/// angle; infinite where there is none. Within target + noise the angle explains a long edge.
+double offNeighboursPlane(const ViewPoints& points, int c, int r, int c2, int r2) {
+    const std::size_t i = points.index(c, r);
+    const double d = points.patch(c, r).disparity(c2, r2);
+    const bool slanted =
+        points.stretch[i] > 1.0F && points.stretch[i] < ViewPoints::kLargestStretch;
+    return slanted && d > 0 && points.onPatch(c, r)
+               ? std::abs(double{points.fb} / d - double{points.z[points.index(c2, r2)]})
+               : std::numeric_limits<double>::infinity();
+}
+
 TEST(GraphKernels, EdgesAndKindsAreThoseOfEquation3) {
+    std::size_t high3 = 0, explained = 0, withinSpacing = 0, withinNoise = 0;
     for (std::uint64_t seed = 1; seed <= 10; ++seed) {
         SCOPED_TRACE("seed " + std::to_string(seed));
         Random random(seed);
@@ -222,8 +236,25 @@ TEST(GraphKernels, EdgesAndKindsAreThoseOfEquation3) {
                     kinds |= high ? unsigned{kDepthStep} : 0U;
                     if (options.delta > 0 && std::abs(weight - options.delta) > 1e-5) {
                         EXPECT_EQ(high, weight > options.delta);
-                    } else if (high) {  // never without a reason; the angle may explain others
-                        EXPECT_GT(weight, options.targetResolution);
+                    } else if (options.delta <= 0) {
+                        const double noise =
+                            options.targetResolution +
+                            3 * std::hypot(double{points.sigma[i]}, double{points.sigma[j]});
+                        const double spacing = std::max(points.z[i], points.z[j]) / view.camera.fx;
+                        const double off = std::min(offNeighboursPlane(points, c, r, c2, r2),
+                                                    offNeighboursPlane(points, c2, r2, c, r));
+                        if (std::abs(weight - noise - spacing) < 1e-5 ||
+                            std::abs(off - noise) < 1e-4) {
+                            continue;  // rounding decides
+                        }
+                        const bool tooLong = weight > noise + spacing;
+                        EXPECT_EQ(high, tooLong && off > noise) << c << ' ' << r;
+                        high3 += high ? 1 : 0;
+                        explained += tooLong && off < noise ? 1 : 0;
+                        if (!tooLong && off > noise) {  // what one term alone keeps low
+                            withinSpacing += weight > noise ? 1 : 0;
+                            withinNoise += weight > options.targetResolution + spacing ? 1 : 0;
+                        }
                     }
                 }
                 EXPECT_EQ(points.kinds[i],
@@ -232,10 +263,39 @@ TEST(GraphKernels, EdgesAndKindsAreThoseOfEquation3) {
         }
         EXPECT_EQ(points.validCount, valid);
     }
+    EXPECT_GT(high3, 100U);
+    EXPECT_GT(explained, 100U);
+    EXPECT_GT(withinSpacing, 100U);
+    EXPECT_GT(withinNoise, 100U);
+}
+
+/// Depth behind which nothing matches in a tile of 8 x 8 pixels: that of the farthest pixel, with
+/// its gate, of the tile and of those around it.
+std::vector<double> slowReach(const ViewPoints& points, const GraphOptions& options) {
+    const int columns = (points.width + 7) / 8, rows = (points.height + 7) / 8;
+    std::vector<double> reach(static_cast<std::size_t>(columns * rows), 0.0);
+    for (int r = 0; r < points.height; ++r) {
+        for (int c = 0; c < points.width; ++c) {
+            const std::size_t i = points.index(c, r);
+            if (!(points.z[i] > 0)) {
+                continue;
+            }
+            const double most = points.z[i] + Association::gate(points, i, options).depth;
+            for (int tr = std::max(0, r / 8 - 1); tr <= std::min(rows - 1, r / 8 + 1); ++tr) {
+                for (int tc = std::max(0, c / 8 - 1); tc <= std::min(columns - 1, c / 8 + 1);
+                     ++tc) {
+                    double& tile = reach[static_cast<std::size_t>(tr * columns + tc)];
+                    tile = std::max(tile, most);
+                }
+            }
+        }
+    }
+    return reach;
 }
 
 TEST(GraphKernels, ProjectionIsEquation4) {
-    for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    std::size_t justWithin = 0, justBeyond = 0;  // 1 cm of where a tile ends
+    for (std::uint64_t seed = 1; seed <= 16; ++seed) {
         SCOPED_TRACE("seed " + std::to_string(seed));
         Random random(seed);
         const Scene scene = randomScene(random);
@@ -244,7 +304,13 @@ TEST(GraphKernels, ProjectionIsEquation4) {
         for (int i = 0; i < 2; ++i) {
             graph.merge(oddView(random, scene));
         }
-        const View view = oddView(random, scene);
+        // As if the surface were nearer, so that some of the map lies about where tiles cease to
+        // reach.
+        View view = oddView(random, scene);
+        const auto nearer = static_cast<float>(random.in(1.0, 2.0));
+        for (float& d : view.disparity.disparity) {
+            d *= nearer;
+        }
         ViewPoints points;
         points.build(view, options);
         Association fast;
@@ -266,28 +332,32 @@ TEST(GraphKernels, ProjectionIsEquation4) {
             EXPECT_NEAR(candidate.v, px.y(), 2e-3);
             EXPECT_EQ(candidate.sigma, graph.vertex(id).sigma);
         }
-        // What is left out lies outside, or behind everything within two tiles.
-        double farthest = 0;
-        for (std::size_t i = 0; i < points.z.size(); ++i) {
-            farthest = std::max<double>(
-                farthest,
-                points.z[i] > 0 ? points.z[i] + Association::gate(points, i, options).depth : 0.0F);
-        }
+        // What is left out lies outside, or behind everything near there with its gate.
+        const std::vector<double> reach = slowReach(points, options);
+        const int tileColumns = (points.width + 7) / 8;
         graph.forEachVertex([&](VertexId id) {
             const Eigen::Vector3d p = toCamera * Eigen::Vector3d(graph.position(id).cast<double>());
             const Eigen::Vector2d px = view.camera.project(p);
-            const double reach =
-                farthest + kNoiseGate * static_cast<double>(graph.vertex(id).sigma);
             const bool inside = p.z() > 0.02 && px.x() > 0 && px.y() > 0 &&
                                 px.x() < points.width - 1 && px.y() < points.height - 1;
-            if (seen.count(id) == 0 && inside && p.z() < reach) {
-                // Only a view of something nearer there can hide it.
-                const int c = static_cast<int>(std::lround(px.x()));
-                const int r = static_cast<int>(std::lround(px.y()));
-                EXPECT_GT(p.z(), points.z[points.index(c, r)]) << "vertex " << id;
+            const Eigen::Vector2d pixel(std::floor(px.x() + 0.5), std::floor(px.y() + 0.5));
+            const double rounding = (px - pixel).cwiseAbs().maxCoeff();  // 0.5: either pixel
+            if (!inside || rounding > 0.49) {
+                return;
+            }
+            const auto tile = static_cast<std::size_t>(
+                static_cast<int>(pixel.y()) / 8 * tileColumns + static_cast<int>(pixel.x()) / 8);
+            const double beyond =
+                p.z() - reach[tile] - kNoiseGate * static_cast<double>(graph.vertex(id).sigma);
+            if (std::abs(beyond) > 1e-4) {
+                EXPECT_EQ(seen.count(id) == 1, beyond < 0) << "vertex " << id;
+                justWithin += beyond < 0 && beyond > -0.01 ? 1 : 0;
+                justBeyond += beyond > 0 && beyond < 0.01 ? 1 : 0;
             }
         });
     }
+    EXPECT_GT(justWithin, 50U);
+    EXPECT_GT(justBeyond, 50U);
 }
 
 /// What the pixels of a vertex say beside its place, one by one.
