@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <limits>
+#include <string_view>
 
 #include "riftmap/core/union_find.h"
 
@@ -13,14 +14,14 @@ namespace {
 
 /// The reason that most of the cells have; of equals the first in the alphabet.
 std::string commonReason(const std::vector<std::uint64_t>& cells, const RiftRecords& records) {
-    std::map<std::string, std::size_t> votes;
+    std::map<std::string_view, std::size_t> votes;
     for (const std::uint64_t key : cells) {
         ++votes[records.at(key).reason];
     }
     const auto most =
         std::max_element(votes.begin(), votes.end(),
                          [](const auto& a, const auto& b) { return a.second < b.second; });
-    return most == votes.end() ? std::string() : most->first;
+    return most == votes.end() ? std::string() : std::string(most->first);
 }
 
 /// The group that holds most of a rift's cells; of equals the first.

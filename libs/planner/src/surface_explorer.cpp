@@ -155,7 +155,7 @@ void SurfaceExplorer::run(const std::atomic<bool>& interrupt, double secondsBefo
         double planMs = 0;
         std::optional<ViewPlan> plan = choose(planMs);
         if (!plan) {
-            stopReason_ = "complete";
+            stopReason_ = planner_.whyNone();
             break;
         }
         move(*plan);

@@ -59,7 +59,8 @@ class SurfaceExplorer {
     /// @param secondsBefore of running that count, too: of the run that this one goes on with
     void run(const std::atomic<bool>& interrupt, double secondsBefore = 0);
 
-    /// "complete", "max_views", "max_metres", "max_seconds", "interrupted".
+    /// The planner's reason ("complete", "no_reachable_pose"), "max_views", "max_metres",
+    /// "max_seconds", "interrupted".
     const std::string& stopReason() const { return stopReason_; }
     const Knowledge& knowledge() const { return knowledge_; }
     /// The rifts as of the last view or, when the run is over, as they ended.

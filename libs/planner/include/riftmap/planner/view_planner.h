@@ -119,6 +119,8 @@ class ViewPlanner {
     virtual std::string name() const = 0;
     /// The next view; nothing if no view is worth it any more. May give tears up in the ledger.
     virtual std::optional<ViewPlan> next(Knowledge& knowledge) = 0;
+    /// Why next() gave none, as a run's stop reason.
+    virtual std::string whyNone() const { return "complete"; }
 };
 
 /// The default planner: views that bring most for their way (see doc/algorithm).
