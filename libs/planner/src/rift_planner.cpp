@@ -24,7 +24,7 @@ ViewScorer::Weights weightsFor(const Knowledge& k) {
         // that gains come true: predicted against measured on two objects.
         weights.reach = 0.3;
         weights.coarse = 0.15;
-        weights.vain = 0.6;
+        weights.vain = weights.vainUnmatched = 0.6;
     }
     return weights;
 }

@@ -80,7 +80,8 @@ ViewScorer::ViewScorer(const SensorModel& sensor, const SurfaceSummary& summary,
 }
 
 double ViewScorer::leftAfterTries(const RiftRecord& record) const {
-    return std::pow(weights_.vain, record.attempts.size());
+    const bool unmatched = (record.cell.kinds & kNoMatch) != 0;
+    return std::pow(unmatched ? weights_.vainUnmatched : weights_.vain, record.attempts.size());
 }
 
 ViewScorer::Benefit ViewScorer::benefit(const RiftRecord& record,

@@ -35,6 +35,9 @@ class ViewScorer {
         double farthestReach = 4.0;  ///< ... and beyond deep steps at most
         double coarse = 0.35;        ///< of surface known better against surface known at all
         double vain = 0.8;  ///< what is left of the worth of a tear after a view that did not help
+        /// The same where pixels beside it had no disparity: what did not match once will hardly
+        /// match from elsewhere, while what was hidden may be seen from another side.
+        double vainUnmatched = 0.5;
     };
 
     /// Everything must outlive the scorer and stay as it is.
