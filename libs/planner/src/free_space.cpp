@@ -10,6 +10,7 @@
 #include <limits>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 namespace riftmap {
 
@@ -108,6 +109,45 @@ class DepthRectangles {
     std::vector<int> measured_;  ///< integral image of the valid pixels
 };
 
+/// What lies before the camera within the image and the range, give or take a pixel.
+class ViewPyramid {
+ public:
+    ViewPyramid(const StereoCamera& c, int firstColumn, double farLimit)
+        : faces_{Eigen::Vector4d(0, 0, 1, 0),
+                 Eigen::Vector4d(0, 0, -1, farLimit),
+                 Eigen::Vector4d(c.fx, 0, c.cx - firstColumn + 1, 0),
+                 Eigen::Vector4d(-c.fx, 0, c.width - c.cx, 0),
+                 Eigen::Vector4d(0, c.fy, c.cy + 1, 0),
+                 Eigen::Vector4d(0, -c.fy, c.height - c.cy, 0)} {}
+
+    /// Of the points first + i * step, i < n, in the camera's frame: the range of i that may be
+    /// inside, with one more at either end.
+    std::pair<int, int> clip(const Eigen::Vector3d& first, const Eigen::Vector3d& step,
+                             int n) const {
+        double low = 0;
+        double high = n;
+        for (const Eigen::Vector4d& face : faces_) {
+            const double at = face.head<3>().dot(first) + face.w();
+            const double slope = face.head<3>().dot(step);
+            if (std::abs(slope) < 1e-9) {
+                high = at < -1e-6 ? -1 : high;
+            } else if (slope > 0) {
+                low = std::max(low, -at / slope);
+            } else {
+                high = std::min(high, -at / slope);
+            }
+        }
+        low = std::min<double>(low, n);
+        high = std::max(high, -1.0);
+        const int begin = std::max(0, static_cast<int>(std::floor(low)) - 1);
+        const int end = std::min(n, static_cast<int>(std::ceil(high)) + 2);
+        return {begin, std::max(begin, end)};
+    }
+
+ private:
+    std::array<Eigen::Vector4d, 6> faces_;  ///< inside where xyz . p + w >= 0
+};
+
 /// Offsets of all voxels nearer than the radius.
 std::vector<Eigen::Vector3i> ball(double radiusInVoxels) {
     const int r = static_cast<int>(std::ceil(radiusInVoxels));
@@ -139,6 +179,7 @@ FreeSpace::FreeSpace(const Eigen::AlignedBox3d& box, double voxelSize)
     }
     size_ = count.cast<int>();
     voxels_.assign(static_cast<std::size_t>(count.prod()), 0);
+    pieces_.assign(voxels_.size(), 0);
 }
 
 Eigen::Vector3i FreeSpace::coordinates(std::size_t index) const {
@@ -183,14 +224,17 @@ void FreeSpace::carve(const View& view, const SensorModel& sensor, bool backgrou
     const int firstColumn = view.disparity.firstColumn;
     const int width = view.disparity.width;
     const int height = view.disparity.height;
+    const ViewPyramid pyramid(camera, firstColumn, sensor.farLimit);
     tbb::parallel_for(
         tbb::blocked_range<int>(0, size_.z()), [&](const tbb::blocked_range<int>& zs) {
             for (int z = zs.begin(); z < zs.end(); ++z) {
                 for (int y = 0; y < size_.y(); ++y) {
-                    Eigen::Vector3d p = camera_T_world * centre({0, y, z});
+                    const Eigen::Vector3d first = camera_T_world * centre({0, y, z});
                     const Eigen::Vector3d step = camera_T_world.rotation.col(0) * voxel_;
-                    std::size_t i = index({0, y, z});
-                    for (int x = 0; x < size_.x(); ++x, ++i, p += step) {
+                    const auto [begin, end] = pyramid.clip(first, step, size_.x());
+                    Eigen::Vector3d p = first + begin * step;
+                    std::size_t i = index({begin, y, z});
+                    for (int x = begin; x < end; ++x, ++i, p += step) {
                         if (p.z() < radius || p.z() > sensor.farLimit ||
                             (voxels_[i] & kFreeBit) != 0) {
                             continue;
@@ -235,14 +279,27 @@ void FreeSpace::carve(const View& view, const SensorModel& sensor, bool backgrou
 }
 
 void FreeSpace::setSurface(const std::vector<Eigen::Vector3d>& points) {
-    for (std::uint8_t& voxel : voxels_) {
-        voxel = static_cast<std::uint8_t>(voxel & ~kSurfaceBit);
+    for (std::size_t i = 0; i < voxels_.size(); ++i) {
+        pieces_[i] = 0;
+        voxels_[i] = static_cast<std::uint8_t>(voxels_[i] & ~kSurfaceBit);
     }
     for (const Eigen::Vector3d& point : points) {
-        const Eigen::Vector3i v = voxelOf(point);
-        if (inside(v)) {
-            voxels_[index(v)] |= kSurfaceBit;
-        }
+        addSurface(point);
+    }
+}
+
+void FreeSpace::addSurface(const Eigen::Vector3d& point) {
+    const Eigen::Vector3i v = voxelOf(point);
+    if (inside(v)) {
+        ++pieces_[index(v)];
+        voxels_[index(v)] |= kSurfaceBit;
+    }
+}
+
+void FreeSpace::removeSurface(const Eigen::Vector3d& point) {
+    const Eigen::Vector3i v = voxelOf(point);
+    if (inside(v) && pieces_[index(v)] > 0 && --pieces_[index(v)] == 0) {
+        voxels_[index(v)] = static_cast<std::uint8_t>(voxels_[index(v)] & ~kSurfaceBit);
     }
 }
 
@@ -328,35 +385,64 @@ void FreeSpace::noteTry(const Eigen::Vector3d& point) {
     }
 }
 
+bool FreeSpace::blocks(std::size_t voxel) const {
+    if (passable_[voxel] != 0) {
+        return false;
+    }
+    const Eigen::Vector3i v = coordinates(voxel);
+    return std::any_of(kFaces.begin(), kFaces.end(), [&](const Eigen::Vector3i& f) {
+        return inside(v + f) && passable_[index(v + f)] != 0;
+    });
+}
+
 void FreeSpace::updateClear(double clearance, const Eigen::AlignedBox3d& limits) {
-    clear_.assign(voxels_.size(), 0);
-    std::size_t at = 0;
-    for (int z = 0; z < size_.z(); ++z) {
-        for (int y = 0; y < size_.y(); ++y) {
-            for (int x = 0; x < size_.x(); ++x, ++at) {
-                clear_[at] = passable(voxels_[at]) && limits.contains(centre({x, y, z})) ? 1 : 0;
-            }
+    if (clearance_ != clearance || limits_.min() != limits.min() || limits_.max() != limits.max()) {
+        clearance_ = clearance;
+        limits_ = limits;
+        passable_.assign(voxels_.size(), 0);
+        blocking_.assign(voxels_.size(), 0);
+        blockers_.assign(voxels_.size(), 0);
+        allowed_.resize(voxels_.size());
+        for (std::size_t i = 0; i < voxels_.size(); ++i) {
+            allowed_[i] = limits.contains(centre(coordinates(i))) ? 1 : 0;
+        }
+    }
+    std::vector<std::size_t> changed;
+    for (std::size_t i = 0; i < voxels_.size(); ++i) {
+        if (passable(voxels_[i]) != (passable_[i] != 0)) {
+            passable_[i] = passable(voxels_[i]) ? 1 : 0;
+            changed.push_back(i);
         }
     }
     // The surface may lie anywhere in a voxel that is not free, and the way between two centres
     // dips below the clearance of both: one voxel more covers the two.
     const std::vector<Eigen::Vector3i> offsets = ball(clearance / voxel_ + 1.0);
-    for (std::size_t i = 0; i < voxels_.size(); ++i) {
-        if (passable(voxels_[i])) {
-            continue;
+    const auto recount = [&](const Eigen::Vector3i& v) {
+        const std::size_t i = index(v);
+        const bool now = blocks(i);
+        if (now == (blocking_[i] != 0)) {
+            return;
         }
-        const Eigen::Vector3i v = coordinates(i);
-        const bool border =
-            std::any_of(kFaces.begin(), kFaces.end(), [&](const Eigen::Vector3i& f) {
-                return inside(v + f) && passable(voxels_[index(v + f)]);
-            });
-        if (border) {
-            for (const Eigen::Vector3i& o : offsets) {
-                if (inside(v + o)) {
-                    clear_[index(v + o)] = 0;
-                }
+        blocking_[i] = now ? 1 : 0;
+        for (const Eigen::Vector3i& o : offsets) {
+            if (inside(v + o)) {
+                now ? ++blockers_[index(v + o)] : --blockers_[index(v + o)];
             }
         }
+    };
+    for (const std::size_t i : changed) {
+        const Eigen::Vector3i v = coordinates(i);
+        recount(v);
+        for (const Eigen::Vector3i& f : kFaces) {
+            if (inside(v + f)) {
+                recount(v + f);
+            }
+        }
+    }
+    clear_.resize(voxels_.size());
+    for (std::size_t i = 0; i < voxels_.size(); ++i) {
+        clear_[i] =
+            static_cast<std::uint8_t>(passable_[i] & allowed_[i] & (blockers_[i] == 0 ? 1 : 0));
     }
 }
 

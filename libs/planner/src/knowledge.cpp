@@ -98,6 +98,10 @@ void PlannerOptions::describe(OptionTable& table) {
               "Different views of a tear that may fail before it is given up");
     table.add("unknown_weight", unknownWeight, 0, 100, "",
               "Weight of unknown space looked into against tears to be closed");
+    table.add(
+        "new_surface_depth", newSurfaceDepth, 0, 100, "",
+        "Up to how many times the depth at which one view is as accurate as asked new surface "
+        "counts in full; 0 = by the share that noise leaves within the target resolution");
     table.add("clearance_margin", clearanceMargin, 0, 10, "m",
               "Kept to surfaces beyond the platform's clearance");
     table.add("targets", targets, 1, 10000, "", "Tears that candidate views are made for, a plan");
@@ -137,18 +141,30 @@ void Knowledge::update(const View& view) {
     // having looked straight up and down. Surface that is seen in them counts all the same.
     space_.declareFree(camera_.translation, limits_.clearance + 2.2 * space_.voxelSize());
     space_.carve(view, sensor_, options_.backgroundIsFree);
-    std::vector<Eigen::Vector3d> surface;
-    for (const auto& [key, block] : summary_.blocks()) {
-        for (const SurfaceCell& cell : block.cells) {
-            if (cell.vertices >= 3) {
-                surface.push_back(cell.position.cast<double>());
-            }
-        }
-    }
-    space_.setSurface(surface);
+    updateSurface(space_);
     if (hull_) {
         hull_->carve(view, sensor_, options_.backgroundIsFree);
-        hull_->setSurface(surface);
+        updateSurface(*hull_);
+    }
+}
+
+/// Where the surface is, as far as the last view changed it.
+void Knowledge::updateSurface(FreeSpace& space) const {
+    const auto forEachPiece = [](const SurfaceSummary::Block& block, const auto& f) {
+        constexpr std::uint32_t kLeast = 3;  // [vertices] fewer may be noise
+        for (const SurfaceCell& cell : block.cells) {
+            if (cell.vertices >= kLeast) {
+                f(cell.position.cast<double>());
+            }
+        }
+    };
+    for (std::size_t i = 0; i < summary_.changed().size(); ++i) {
+        forEachPiece(summary_.former()[i],
+                     [&](const Eigen::Vector3d& p) { space.removeSurface(p); });
+        const auto it = summary_.blocks().find(summary_.changed()[i]);
+        if (it != summary_.blocks().end()) {
+            forEachPiece(it->second, [&](const Eigen::Vector3d& p) { space.addSurface(p); });
+        }
     }
 }
 

@@ -32,14 +32,19 @@ void RiftLedger::updateCell(const SurfaceCell& cell, double cellSize) {
     const bool torn = cell.open > 0;
     const bool large = static_cast<double>(cell.rim) >= 1.5 * resolution_ ||
                        static_cast<double>(cell.coarse) >= 0.15 * cellSize * cellSize;
-    auto it = records_.find(cell.key);
-    if (it == records_.end()) {
+    std::vector<RiftRecord*>& block = byBlock_[SurfaceSummary::blockOf(cell.key)];
+    auto at = std::lower_bound(
+        block.begin(), block.end(), cell.key,
+        [](const RiftRecord* record, std::uint64_t key) { return record->cell.key < key; });
+    if (at == block.end() || (*at)->cell.key != cell.key) {
         if (!torn) {
             return;
         }
-        it = records_.emplace(cell.key, RiftRecord{}).first;
+        RiftRecord& fresh = records_[cell.key];
+        fresh.cell.key = cell.key;
+        at = block.insert(at, &fresh);
     }
-    RiftRecord& r = it->second;
+    RiftRecord& r = **at;
     if (!torn) {
         if (r.state != RiftState::kResolved) {
             r.state = RiftState::kResolved;
@@ -81,14 +86,19 @@ void RiftLedger::update(const SurfaceSummary& summary) {
                 updateCell(cell, summary.cellSize());
             }
         }
-    }
-    for (auto& [key, r] : records_) {
-        if (r.state != RiftState::kResolved && summary.hasChanged(key) &&
-            summary.find(key) == nullptr) {
-            r.state = RiftState::kResolved;
-            r.reason = "seen through";
+        for (RiftRecord* r : inBlock(blockKey)) {
+            if (r->state != RiftState::kResolved && summary.find(r->cell.key) == nullptr) {
+                r->state = RiftState::kResolved;
+                r->reason = "seen through";
+            }
         }
     }
+}
+
+const std::vector<RiftRecord*>& RiftLedger::inBlock(std::uint64_t block) const {
+    static const std::vector<RiftRecord*> kNone;
+    const auto it = byBlock_.find(block);
+    return it == byBlock_.end() ? kNone : it->second;
 }
 
 void RiftLedger::judge(const SurfaceSummary& summary, const std::vector<std::uint64_t>& keys,

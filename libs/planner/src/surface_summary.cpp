@@ -93,6 +93,14 @@ SurfaceCell toCell(const Sums& s, std::uint64_t key, double cell) {
     return c;
 }
 
+double coarseIn(const SurfaceSummary::Block& block) {
+    double area = 0;
+    for (const SurfaceCell& cell : block.cells) {
+        area += static_cast<double>(cell.coarse);
+    }
+    return area;
+}
+
 }  // namespace
 
 SurfaceSummary::SurfaceSummary(double cell, double resolution)
@@ -130,10 +138,6 @@ std::array<std::uint64_t, 13> SurfaceSummary::neighbourOffsets() {
     return offsets;
 }
 
-bool SurfaceSummary::hasChanged(std::uint64_t cell) const {
-    return std::binary_search(changed_.begin(), changed_.end(), blockOf(cell));
-}
-
 const SurfaceCell* SurfaceSummary::find(std::uint64_t key) const {
     const auto it = blocks_.find(blockOf(key));
     if (it == blocks_.end()) {
@@ -144,14 +148,6 @@ const SurfaceCell* SurfaceSummary::find(std::uint64_t key) const {
         std::lower_bound(cells.begin(), cells.end(), key,
                          [](const SurfaceCell& a, std::uint64_t k) { return a.key < k; });
     return c != cells.end() && c->key == key ? &*c : nullptr;
-}
-
-std::size_t SurfaceSummary::cellCount() const {
-    std::size_t n = 0;
-    for (const auto& [key, block] : blocks_) {
-        n += block.cells.size();
-    }
-    return n;
 }
 
 void SurfaceSummary::update(const PixelGraph& graph, const View& view) {
@@ -205,11 +201,18 @@ void SurfaceSummary::update(const PixelGraph& graph, const View& view) {
     std::vector<Block> rebuilt(changed_.size());
     tbb::parallel_for(std::size_t{0}, changed_.size(),
                       [&](std::size_t i) { rebuilt[i] = build(graph, changed_[i]); });
+    former_.assign(changed_.size(), {});
     for (std::size_t i = 0; i < changed_.size(); ++i) {
-        if (rebuilt[i].cells.empty()) {
-            blocks_.erase(changed_[i]);
-        } else {
+        const auto it = blocks_.find(changed_[i]);
+        if (it != blocks_.end()) {
+            former_[i] = std::move(it->second);
+        }
+        cellCount_ += rebuilt[i].cells.size() - former_[i].cells.size();
+        coarseArea_ += coarseIn(rebuilt[i]) - coarseIn(former_[i]);
+        if (!rebuilt[i].cells.empty()) {
             blocks_[changed_[i]] = std::move(rebuilt[i]);
+        } else if (it != blocks_.end()) {
+            blocks_.erase(it);
         }
     }
 }
@@ -256,6 +259,7 @@ SurfaceSummary::Block SurfaceSummary::build(const PixelGraph& graph, std::uint64
                 if (s.vertices > 0) {
                     block.cells.push_back(
                         toCell(s, pack(corner + Eigen::Vector3i(x, y, z)), cell_));
+                    block.positions.push_back(block.cells.back().position);
                 }
             }
         }

@@ -3,6 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <random>
+#include <string>
+#include <utility>
+
 #include "planner_scene.h"
 
 namespace riftmap {
@@ -160,6 +164,28 @@ TEST(SensorModel, goodDepthFollowsTheNoise) {
     EXPECT_NEAR(sensor.camera.depthSigma(z, 0.25), 0.005, 1e-6);
 }
 
+TEST(SensorModel, knowsHowMuchOfWhatIsSeenFromAfarIsRight) {
+    SensorModel sensor;
+    sensor.camera = test::smallCamera();
+    EXPECT_EQ(sensor.shareWithin(0.01, 5.0), 1.0);  // without noise
+    sensor.sigmaDisparity = 0.25;
+    const double oneSigma = sensor.camera.depthSigma(2.0, 0.25);
+    EXPECT_NEAR(sensor.shareWithin(oneSigma, 2.0), 0.6827, 1e-4);
+    EXPECT_NEAR(sensor.shareWithin(2 * oneSigma, 2.0), 0.9545, 1e-4);
+    EXPECT_LT(sensor.shareWithin(oneSigma, 4.0), sensor.shareWithin(oneSigma, 2.0));
+}
+
+TEST(SensorModel, doesNotCountPixelsThatAreNoSurface) {
+    View view = test::viewOf(lookAt({0, 0, 0}, {1, 0, 0}), test::wall(3.0));
+    const double plain = sensorOf(view).sigmaDisparity;
+    for (std::size_t i = 0; i < view.disparity.sigma.size(); ++i) {
+        if (i % 3 != 0) {  // most of them
+            view.disparity.sigma[i] = 0.4F * view.disparity.disparity[i];
+        }
+    }
+    EXPECT_EQ(sensorOf(view).sigmaDisparity, plain);
+}
+
 TEST(FreeSpace, theFrontierIsTheSkinOfWhatIsUnknown) {
     const Eigen::AlignedBox3d box(Eigen::Vector3d(-1, -1, -1), Eigen::Vector3d(1, 1, 1));
     const Eigen::AlignedBox3d object(Eigen::Vector3d(-0.5, -0.5, -0.5),
@@ -205,6 +231,97 @@ TEST(FreeSpace, surfaceThatWasSeenHasNoFrontierBehindIt) {
         space.setSurface(wall);
         EXPECT_TRUE(space.frontier(box).empty());
     }
+}
+
+TEST(FreeSpace, whatIsClearDependsOnWhatIsKnownNotOnTheWayThere) {
+    const unsigned seed = std::random_device{}();
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937 random(seed);
+    const auto uniform = [&](double a, double b) {
+        return std::uniform_real_distribution<double>(a, b)(random);
+    };
+    const auto place = [&] {
+        return Eigen::Vector3d(uniform(-1.2, 4.2), uniform(-2.2, 2.2), uniform(-2.2, 2.2));
+    };
+    const Eigen::AlignedBox3d limits(Eigen::Vector3d(-0.8, -1.5, -1.5),
+                                     Eigen::Vector3d(3.5, 1.5, 1.5));
+    FreeSpace grown(kBox, 0.1);
+    std::vector<Eigen::Vector3d> surface;
+    std::vector<View> views;
+    std::vector<std::pair<Eigen::Vector3d, double>> balls;
+    for (int round = 0; round < 12; ++round) {
+        const Eigen::Vector3d eye(uniform(-0.5, 0.5), uniform(-1, 1), uniform(-1, 1));
+        views.push_back(test::viewOf(lookAt(eye, eye + Eigen::Vector3d(1, uniform(-1, 1), 0)),
+                                     test::wall(uniform(1.5, 3.5))));
+        grown.carve(views.back(), sensorOf(views.back()), false);
+        balls.emplace_back(place(), uniform(0.2, 0.6));
+        grown.declareFree(balls.back().first, balls.back().second);
+        for (int i = 0; i < 40; ++i) {
+            surface.push_back(place());
+            grown.addSurface(surface.back());
+        }
+        for (int i = 0; i < 15; ++i) {
+            std::swap(surface[random() % surface.size()], surface.back());
+            grown.removeSurface(surface.back());
+            surface.pop_back();
+        }
+        grown.updateClear(0.25, limits);
+    }
+    FreeSpace atOnce(kBox, 0.1);
+    for (std::size_t i = 0; i < views.size(); ++i) {
+        atOnce.carve(views[i], sensorOf(views[i]), false);
+        atOnce.declareFree(balls[i].first, balls[i].second);
+    }
+    atOnce.setSurface(surface);
+    atOnce.updateClear(0.25, limits);
+    std::size_t clear = 0;
+    for (double x = -0.95; x < 4; x += 0.1) {
+        for (double y = -1.95; y < 2; y += 0.1) {
+            for (double z = -1.95; z < 2; z += 0.1) {
+                const Eigen::Vector3d p(x, y, z);
+                ASSERT_EQ(grown.at(p), atOnce.at(p)) << p.transpose();
+                ASSERT_EQ(grown.isClear(p), atOnce.isClear(p)) << p.transpose();
+                clear += grown.isClear(p) ? 1 : 0;
+            }
+        }
+    }
+    EXPECT_GT(clear, 100U);
+}
+
+TEST(FreeSpace, carvingFindsEveryVoxelInView) {
+    // Against a question for each voxel alone: is its middle before the wall and in the image?
+    FreeSpace space(kBox, 0.1);
+    const Pose pose = lookAt({0.3, 0.2, -0.1}, {1.2, 0.9, 0.5});
+    const View view = test::viewOf(pose, test::wall(3.03), 20);
+    const SensorModel sensor = sensorOf(view);
+    space.carve(view, sensor, false);
+    const double ball = 0.087;
+    std::size_t found = 0;
+    for (double x = -0.95; x < 4; x += 0.1) {
+        for (double y = -1.95; y < 2; y += 0.1) {
+            for (double z = -1.95; z < 2; z += 0.1) {
+                const Eigen::Vector3d p(x, y, z);
+                const Eigen::Vector3d c = pose.inverse() * p;
+                if (c.z() < 0.2 || c.z() > 5.9) {
+                    continue;
+                }
+                const Eigen::Vector2d uv = view.camera.project(c);
+                const double px = view.camera.fx * ball / c.z();
+                const auto inside = [&](double margin) {
+                    return uv.x() > 20 + margin && uv.x() < 255 - margin && uv.y() > margin &&
+                           uv.y() < 191 - margin;
+                };
+                const double before = 3.03 - p.x();
+                if (inside(px + 2) && before > 0.3) {
+                    EXPECT_EQ(space.at(p), State::kFree) << p.transpose();
+                    ++found;
+                } else if (!inside(-1) || before < -0.06) {
+                    EXPECT_EQ(space.at(p), State::kUnknown) << p.transpose();
+                }
+            }
+        }
+    }
+    EXPECT_GT(found, 1000U);
 }
 
 }  // namespace

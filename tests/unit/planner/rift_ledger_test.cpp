@@ -50,6 +50,42 @@ TEST_F(LedgerOnWall, theRimIsOpenAndTheMiddleIsNot) {
     }
 }
 
+TEST_F(LedgerOnWall, whatIsCountedAlongTheWayIsWhatIsThere) {
+    auto before = summary.blocks();
+    for (const double y : {0.4, -0.9, 1.3}) {
+        see(lookAt({-0.3 * y, y, 0.1}, {1, y, 0}));
+        ASSERT_EQ(summary.former().size(), summary.changed().size());
+        for (std::size_t i = 0; i < summary.changed().size(); ++i) {
+            const auto it = before.find(summary.changed()[i]);
+            const std::size_t cells = it == before.end() ? 0 : it->second.cells.size();
+            EXPECT_EQ(summary.former()[i].cells.size(), cells);
+        }
+        std::size_t cells = 0;
+        double coarse = 0;
+        std::size_t open = 0;
+        for (const auto& [key, block] : summary.blocks()) {
+            cells += block.cells.size();
+            ASSERT_EQ(block.positions.size(), block.cells.size());
+            for (std::size_t i = 0; i < block.cells.size(); ++i) {
+                EXPECT_EQ(block.positions[i], block.cells[i].position);
+                coarse += static_cast<double>(block.cells[i].coarse);
+            }
+            std::uint64_t last = 0;
+            for (const RiftRecord* record : ledger.inBlock(key)) {
+                EXPECT_EQ(&ledger.records().at(record->cell.key), record);
+                EXPECT_GT(record->cell.key, last);
+                last = record->cell.key;
+                open += record->state == RiftState::kOpen ? 1 : 0;
+            }
+        }
+        EXPECT_EQ(summary.cellCount(), cells);
+        EXPECT_NEAR(summary.area(), 0.04 * static_cast<double>(cells), 1e-9);
+        EXPECT_NEAR(summary.coarseArea(), coarse, 1e-6);
+        EXPECT_EQ(ledger.counts()[static_cast<std::size_t>(RiftState::kOpen)], open);
+        before = summary.blocks();
+    }
+}
+
 TEST_F(LedgerOnWall, aTearThatIsClosedIsResolved) {
     see(lookAt({0, 1, 0}, {1, 1, 0}));  // a metre to the left: its left rim is inside now
     std::size_t resolved = 0;

@@ -37,6 +37,10 @@ class FreeSpace {
     void carve(const View& view, const SensorModel& sensor, bool backgroundIsFree);
     /// Marks the voxels of these points as surface, and no others.
     void setSurface(const std::vector<Eigen::Vector3d>& points);
+    /// A piece of surface more, or one less that was added before: a voxel is surface while it
+    /// holds any. O(1).
+    void addSurface(const Eigen::Vector3d& point);
+    void removeSurface(const Eigen::Vector3d& point);
 
     State at(const Eigen::Vector3d& point) const;
     /// Part of a ray in unknown space.
@@ -61,7 +65,8 @@ class FreeSpace {
     static constexpr std::uint8_t kTries = 2;
 
     /// Finds the voxels at whose centres a ball of radius `clearance` fits inside `limits`, with
-    /// what the way between two of them needs. To be called again after changes.
+    /// what the way between two of them needs. To be called again after changes; that costs in
+    /// proportion to them, and little for the grid.
     void updateClear(double clearance, const Eigen::AlignedBox3d& limits);
     /// After updateClear(): which of those can be reached from `start`, straight from voxel centre
     /// to voxel centre, and how far that is. The start's own voxel counts as clear.
@@ -114,6 +119,8 @@ class FreeSpace {
     bool passable(std::uint8_t voxel) const {
         return (voxel & kFreeBit) != 0 && (voxel & kSurfaceBit) == 0;
     }
+    /// Something not known to be free, beside what is.
+    bool blocks(std::size_t voxel) const;
     void searchFrom(const Eigen::Vector3i& start);
 
     Eigen::AlignedBox3d box_;
@@ -121,6 +128,14 @@ class FreeSpace {
     Eigen::Vector3d origin_;
     Eigen::Vector3i size_;
     std::vector<std::uint8_t> voxels_;
+    std::vector<std::uint16_t> pieces_;  ///< of surface in each voxel
+    /// What updateClear() found the last time: voxels that were passable, those that blocked
+    /// others, and how many of those are too near to each.
+    std::vector<std::uint8_t> passable_, blocking_;
+    std::vector<std::uint32_t> blockers_;
+    std::vector<std::uint8_t> allowed_;  ///< 1 = inside the limits of updateClear()
+    double clearance_ = -1;              ///< of updateClear()
+    Eigen::AlignedBox3d limits_;
     std::vector<std::uint8_t> clear_;    ///< 1 = the ball fits here
     std::vector<float> distance_;        ///< from the start [m]
     std::vector<std::uint32_t> parent_;  ///< voxel before it on the way

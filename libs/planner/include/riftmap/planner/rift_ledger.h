@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <map>
 #include <string>
+#include <unordered_map>
 #include <vector>
 
 #include "riftmap/planner/surface_summary.h"
@@ -63,6 +64,8 @@ class RiftLedger {
     /// Size of the tear in a cell [m^2]: area that closing it may bring at least.
     float tear(const SurfaceCell& cell, double cellSize) const;
     const std::map<std::uint64_t, RiftRecord>& records() const { return records_; }
+    /// Those of the cells in one block of the summary, ascending in key; they stay where they are.
+    const std::vector<RiftRecord*>& inBlock(std::uint64_t block) const;
     std::array<std::size_t, kRiftStates> counts() const;
     /// Share of the area seen again that a vain try from here repeats: true if some attempt looked
     /// from nearly the same side and distance.
@@ -74,6 +77,7 @@ class RiftLedger {
     double resolution_;
     int maxAttempts_;
     std::map<std::uint64_t, RiftRecord> records_;
+    std::unordered_map<std::uint64_t, std::vector<RiftRecord*>> byBlock_;
 };
 
 }  // namespace riftmap

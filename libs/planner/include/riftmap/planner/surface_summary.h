@@ -51,13 +51,17 @@ class SurfaceSummary {
     struct Block {
         Eigen::AlignedBox3d box;         ///< of the cube of cells
         std::vector<SurfaceCell> cells;  ///< ascending in key
+        /// Their positions once more, side by side: all that drawing them takes.
+        std::vector<Eigen::Vector3f> positions;
     };
     /// All blocks by key, in ascending order.
     const std::map<std::uint64_t, Block>& blocks() const { return blocks_; }
-    /// Keys of the blocks that the last update worked on.
+    /// Keys of the blocks that the last update worked on, ascending.
     const std::vector<std::uint64_t>& changed() const { return changed_; }
-    /// Whether it worked on the block of this cell.
-    bool hasChanged(std::uint64_t cell) const;
+    /// The same blocks as they were before it; empty ones for those that are new.
+    const std::vector<Block>& former() const { return former_; }
+    /// Key of the block of a cell.
+    static std::uint64_t blockOf(std::uint64_t cell);
     /// Nothing if the cell holds no vertex.
     const SurfaceCell* find(std::uint64_t key) const;
     std::uint64_t keyOf(const Eigen::Vector3d& point) const;
@@ -66,10 +70,13 @@ class SurfaceSummary {
     static std::uint64_t keyAt(const Eigen::Vector3i& index);
     /// Added to a cell's key: the keys of 13 of the 26 cells around it, those that are larger.
     static std::array<std::uint64_t, 13> neighbourOffsets();
-    std::size_t cellCount() const;
+    std::size_t cellCount() const { return cellCount_; }
+    /// Area of a sheet through each cell, all together [m^2].
+    double area() const { return static_cast<double>(cellCount_) * cell_ * cell_; }
+    /// Area of the cells that is sampled too sparsely or known too badly, all together [m^2].
+    double coarseArea() const { return coarseArea_; }
 
  private:
-    static std::uint64_t blockOf(std::uint64_t cell);
     static constexpr int kCellsPerSide = 8;
 
     Block build(const PixelGraph& graph, std::uint64_t blockKey) const;
@@ -77,6 +84,9 @@ class SurfaceSummary {
     double cell_, resolution_;
     std::map<std::uint64_t, Block> blocks_;
     std::vector<std::uint64_t> changed_;
+    std::vector<Block> former_;
+    std::size_t cellCount_ = 0;
+    double coarseArea_ = 0;
 };
 
 }  // namespace riftmap
