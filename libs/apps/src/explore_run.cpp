@@ -117,6 +117,10 @@ ExploreRun::ExploreRun(ExploreProgram& program, RunDirectory& directory, bool re
         }
         curve_ = std::make_unique<CsvWriter>(directory.file("coverage.csv"), names, mode);
     }
+    gains_ = std::make_unique<CsvWriter>(
+        directory.file("gains.csv"),
+        std::vector<std::string>{"view", "expected_tears_m2", "expected_finer_m2",
+                                 "expected_unknown_m2", "new_m2", "well_known_m2"});
     if (program.explore_.rawlog) {
         rawlog_ = std::make_unique<RawlogWriter>(
             directory.file("run.rawlog"), RawlogWriter::Images::kExternal,
@@ -255,6 +259,8 @@ void ExploreRun::onStep(const ExploreStep& measured, const Knowledge& knowledge)
         figures.coverage = coverageAfter(step);
         row.coverage = figures.coverage[headlineIndex()].cObs;
     }
+    gains_->row({step.view, step.gain - step.coarseGain - step.unknownGain, step.coarseGain,
+                 step.unknownGain, step.newArea, step.wellKnownArea});
     history_.push_back(std::move(figures));
     if (known) {
         recorder_->stepAgain(row);

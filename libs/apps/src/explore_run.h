@@ -71,6 +71,7 @@ class ExploreRun {
     std::unique_ptr<RawlogWriter> rawlog_;
     std::unique_ptr<SurfaceExplorer> explorer_;
     std::unique_ptr<CsvWriter> curve_;
+    std::unique_ptr<CsvWriter> gains_;  ///< what was expected of each view and what came true
     std::vector<StepFigures> history_;
     std::vector<Pose> taken_;
     std::vector<Eigen::Vector3f> cloud_;  ///< what the last view measured

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <unordered_map>
 
 #include "view_choice.h"
 
@@ -18,6 +19,7 @@ constexpr double kPi = 3.14159265358979323846;
 ViewScorer::Weights weightsFor(const Knowledge& k) {
     ViewScorer::Weights weights;
     weights.unknown = k.options().unknownWeight;
+    weights.newSurfaceDepth = k.options().newSurfaceDepth;
     if (k.surfaceBox()) {
         // Unseen surface counts where it may be (the frontier), so the rims of the surface seen
         // stand for holes that are smaller than that, and coarse surface is mostly covered. All so
@@ -246,6 +248,8 @@ std::optional<ViewPlan> Choice::planFor(const Candidate& c) const {
     ViewPlan plan;
     plan.path = c.path == 0.0 ? std::vector<Pose>{c.pose} : k_.pathTo(c.pose);
     plan.gain = c.score.gain;
+    plan.coarseGain = c.score.coarseGain;
+    plan.unknownGain = c.score.unknownGain;
     plan.cells = c.score.cells;
     plan.unknown = k_.surfaceBox() ? frontierSeen(c.pose) : scorer_.unknownSeen(c.pose);
     if (plan.path.empty()) {
@@ -312,9 +316,11 @@ void Choice::addAllInSight(const RiftRecord& record, std::size_t most) {
 }
 
 /// Whether the camera can be anywhere where this place is within its range.
-bool Choice::inRange(const Eigen::Vector3d& place) const {
-    const std::vector<Eigen::Vector3d> eyes = k_.space().reachable(1);
-    return std::any_of(eyes.begin(), eyes.end(), [&](const Eigen::Vector3d& eye) {
+bool Choice::inRange(const Eigen::Vector3d& place) {
+    if (reachable_.empty()) {
+        reachable_ = k_.space().reachable(1);
+    }
+    return std::any_of(reachable_.begin(), reachable_.end(), [&](const Eigen::Vector3d& eye) {
         const double distance = (eye - place).norm();
         return distance > k_.sensor().nearLimit && distance < k_.sensor().farLimit;
     });
@@ -347,8 +353,15 @@ std::optional<ViewPlan> Choice::lastResorts(double minGain) {
     std::stable_sort(left.begin(), left.end(), [&](const RiftRecord* a, const RiftRecord* b) {
         return k_.ledger().tear(a->cell, cell) > k_.ledger().tear(b->cell, cell);
     });
+    // Views that show a tear, were weighed, and are not worth it, made for it or for others.
+    constexpr std::size_t kViews = 12;
+    std::unordered_map<std::uint64_t, std::size_t> shown;
     for (const RiftRecord* record : left) {
         if (record->state != RiftState::kOpen) {
+            continue;
+        }
+        if (shown[record->cell.key] >= kViews) {
+            giveUp(*record, true, true);
             continue;
         }
         candidates_.clear();
@@ -363,19 +376,26 @@ std::optional<ViewPlan> Choice::lastResorts(double minGain) {
         });
         bool reachable = true;
         if (candidates_.empty()) {  // before it is said that there is none: from all sides
-            addAllInSight(*record, 12);
+            addAllInSight(*record, kViews);
             reachable = !candidates_.empty() || inRange(p);
         }
         const bool visible = !candidates_.empty();
-        if (candidates_.size() > 12) {
+        if (candidates_.size() > kViews) {
             std::stable_sort(candidates_.begin(), candidates_.end(),
                              [&](const Candidate& a, const Candidate& b) {
                                  return scorer_.benefit(*record, a.pose.translation).area >
                                         scorer_.benefit(*record, b.pose.translation).area;
                              });
-            candidates_.resize(12);
+            candidates_.resize(kViews);
         }
         scoreFrom(0);
+        for (const Candidate& c : candidates_) {
+            if (c.score.gain < minGain) {
+                for (const std::uint64_t key : c.score.cells) {
+                    ++shown[key];
+                }
+            }
+        }
         std::erase_if(candidates_, [&](const Candidate& c) {
             return c.score.nearShare > 0.3 || c.score.gain < minGain ||
                    !std::binary_search(c.score.cells.begin(), c.score.cells.end(),
@@ -390,8 +410,7 @@ std::optional<ViewPlan> Choice::lastResorts(double minGain) {
 }
 
 double Choice::minGain() const {
-    const double cell = k_.summary().cellSize();
-    return k_.options().minGain * static_cast<double>(k_.summary().cellCount()) * cell * cell;
+    return k_.options().minGain * k_.summary().area();
 }
 
 std::optional<ViewPlan> Choice::make() {

@@ -24,7 +24,10 @@ SensorModel SensorModel::of(const View& view, const PlatformLimits& limits) {
     }
     std::vector<float> sigma;
     for (std::size_t i = 0; i < view.disparity.sigma.size(); i += 17) {
-        if (std::isfinite(view.disparity.disparity[i])) {
+        // A depth that is not known within a third of itself is no surface.
+        if (std::isfinite(view.disparity.disparity[i]) &&
+            3.0F * view.disparity.sigma[i] <
+                view.disparity.disparity[i] + static_cast<float>(view.camera.doffs)) {
             sigma.push_back(view.disparity.sigma[i]);
         }
     }
@@ -43,6 +46,11 @@ double SensorModel::goodDepth(double resolution) const {
                          std::sqrt(resolution / 2 * camera.fx * camera.baseline / sigmaDisparity));
     }
     return std::max(depth, 1.15 * nearLimit);
+}
+
+double SensorModel::shareWithin(double resolution, double depth) const {
+    const double sigma = camera.depthSigma(depth, sigmaDisparity);
+    return sigma > 0 ? std::erf(resolution / (std::sqrt(2.0) * sigma)) : 1.0;
 }
 
 Pose SensorModel::lookingAt(const Eigen::Vector3d& eye, const Eigen::Vector3d& target) const {

@@ -86,7 +86,12 @@ void SurfaceExplorer::look(const std::optional<ViewPlan>& plan, double planMs) {
     if (plan) {
         unknown = plan->unknown;
     }
+    const SurfaceSummary& summary = knowledge_.summary();
+    const double areaBefore = summary.area();
+    const double coarseBefore = summary.coarseArea();
     knowledge_.update(view);
+    step.newArea = summary.area() - areaBefore;
+    step.wellKnownArea = step.newArea - (summary.coarseArea() - coarseBefore);
     if (plan) {
         knowledge_.ledger().judge(knowledge_.summary(), plan->cells, before,
                                   view.world_T_camera.translation);
@@ -96,6 +101,8 @@ void SurfaceExplorer::look(const std::optional<ViewPlan>& plan, double planMs) {
             }
         }
         step.gain = plan->gain;
+        step.coarseGain = plan->coarseGain;
+        step.unknownGain = plan->unknownGain;
     }
     step.knowledgeMs = msSince(t);
     lastKnowledgeMs_ = step.knowledgeMs;

@@ -52,7 +52,7 @@ class Choice {
     std::optional<ViewPlan> planFor(const Candidate& candidate) const;
     std::optional<Eigen::Vector3d> lookOut(const RiftRecord& record,
                                            const Eigen::Vector3d& out) const;
-    bool inRange(const Eigen::Vector3d& place) const;
+    bool inRange(const Eigen::Vector3d& place);
     void addAllInSight(const RiftRecord& record, std::size_t most);
     void giveUp(const RiftRecord& record, bool reachable, bool visible);
     std::optional<ViewPlan> lastResorts(double minGain);
@@ -67,7 +67,8 @@ class Choice {
     std::mt19937 random_;
     double good_;
     std::vector<Candidate> candidates_;
-    std::vector<float> worth_;  ///< of the items of a tour
+    std::vector<float> worth_;                ///< of the items of a tour
+    std::vector<Eigen::Vector3d> reachable_;  ///< places, once they were asked for
 };
 
 }  // namespace riftmap

@@ -2,8 +2,10 @@
 #include "riftmap/planner/view_scorer.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <map>
 
 namespace riftmap {
 
@@ -12,9 +14,6 @@ namespace {
 constexpr int kPixels = 12;  ///< of the image to one of the depth buffer, along each axis
 constexpr int kRayStride = 2;
 constexpr double kMargin = 6;  ///< [px] a tear at the very border of the image stays torn
-/// Up to how many good depths away new surface counts in full. One view is not accurate enough
-/// there, but covers much; the views after it make it better.
-constexpr double kNewSurfaceDepth = 1.5;
 constexpr float kFar = std::numeric_limits<float>::infinity();
 
 }  // namespace
@@ -65,23 +64,47 @@ ViewScorer::ViewScorer(const SensorModel& sensor, const SurfaceSummary& summary,
     for (const auto& [key, block] : summary.blocks()) {
         BlockView b{block.box.center().cast<float>(),
                     static_cast<float>(block.box.diagonal().norm() / 2), &block, open_.size(), 0};
-        for (const SurfaceCell& cell : block.cells) {
-            if (cell.open == 0) {
-                continue;
-            }
-            const auto it = ledger.records().find(cell.key);
-            if (it != ledger.records().end() && it->second.state == RiftState::kOpen) {
-                open_.push_back(&it->second);
+        for (const RiftRecord* record : ledger.inBlock(key)) {
+            if (record->state == RiftState::kOpen) {
+                open_.push_back(record);
             }
         }
         b.lastOpen = open_.size();
         blocks_.push_back(b);
+    }
+    groupBlocks();
+}
+
+void ViewScorer::groupBlocks() {
+    constexpr float kBlocks = 4;  // of a group, along each axis
+    std::map<std::array<int, 3>, std::size_t> index;
+    for (std::size_t i = 0; i < blocks_.size(); ++i) {
+        const Eigen::AlignedBox3f box = blocks_[i].block->box.cast<float>();
+        const Eigen::Vector3i at =
+            (blocks_[i].centre / (kBlocks * box.sizes().x())).array().floor().cast<int>();
+        const auto [it, isNew] = index.try_emplace({at.x(), at.y(), at.z()}, groups_.size());
+        if (isNew) {
+            groups_.emplace_back();
+        }
+        Group& group = groups_[it->second];
+        group.box.extend(box);
+        group.blocks.push_back(static_cast<std::uint32_t>(i));
     }
 }
 
 double ViewScorer::leftAfterTries(const RiftRecord& record) const {
     const bool unmatched = (record.cell.kinds & kNoMatch) != 0;
     return std::pow(unmatched ? weights_.vainUnmatched : weights_.vain, record.attempts.size());
+}
+
+/// What surface that is new is worth if it is seen from so far. One view is not accurate enough
+/// beyond the good depth, but covers much, and the views after it may make it better.
+double ViewScorer::newSurfaceShare(double distance) const {
+    const double full = weights_.newSurfaceDepth * goodDepth_;
+    if (full <= 0) {
+        return sensor_.shareWithin(resolution_, distance);
+    }
+    return distance <= full ? 1.0 : std::pow(full / distance, 2);
 }
 
 ViewScorer::Benefit ViewScorer::benefit(const RiftRecord& record,
@@ -105,8 +128,7 @@ ViewScorer::Benefit ViewScorer::benefit(const RiftRecord& record,
     const double angleQuality = std::clamp((angle - 0.2) / 0.35, 0.0, 1.0);
     // New surface is worth something from afar too; known surface gets better only from where the
     // view measures well.
-    const double afar = kNewSurfaceDepth * goodDepth_;
-    const double torn = distance <= afar ? 1.0 : std::pow(afar / distance, 2);
+    const double torn = newSurfaceShare(distance);
     const double coarse = std::clamp((1.6 * goodDepth_ - distance) / (0.6 * goodDepth_), 0.0, 1.0);
     const double vain = leftAfterTries(record);
     const double cell = summary_->cellSize();
@@ -116,7 +138,8 @@ ViewScorer::Benefit ViewScorer::benefit(const RiftRecord& record,
     const double tornArea = static_cast<double>(record.cell.rim) * reach;
     const double coarseArea = weights_.coarse * static_cast<double>(record.cell.coarse);
     Benefit result;
-    result.area = angleQuality * vain * (torn * tornArea + coarse * coarseArea);
+    result.coarseArea = angleQuality * vain * coarse * coarseArea;
+    result.area = angleQuality * vain * torn * tornArea + result.coarseArea;
     result.quality = angleQuality * (tornArea > 0.3 * coarseArea ? torn : coarse);
     result.torn = angleQuality * vain * torn;
     result.coarse = angleQuality * vain * coarse;
@@ -138,25 +161,34 @@ ViewScorer::DepthBuffer ViewScorer::draw(const Pose& camera_T_world,
     const Eigen::Vector3f translation = camera_T_world.translation.cast<float>();
     const float half = 0.6F * static_cast<float>(summary_->cellSize());
     const auto farLimit = static_cast<float>(sensor_.farLimit);
-    for (const BlockView& block : blocks_) {
-        const Eigen::Vector3f m = rotation * block.centre + translation;
+    const auto outOfSight = [&](const Eigen::Vector3f& centre, float radius) {
+        const Eigen::Vector3f m = rotation * centre + translation;
         const float z = std::max(m.z(), 0.05F);
-        const float spread = b.fx * block.radius / z;
+        const float spread = b.fx * radius / z;
         const float u = b.fx * m.x() / z + b.cx;
         const float v = b.fy * m.y() / z + b.cy;
-        if (m.z() < -block.radius || m.z() > farLimit + block.radius ||
-            (m.z() > block.radius &&
-             (u < -spread || v < -spread || u > static_cast<float>(b.width) + spread ||
-              v > static_cast<float>(b.height) + spread))) {
+        return m.z() < -radius || m.z() > farLimit + radius ||
+               (m.z() > radius &&
+                (u < -spread || v < -spread || u > static_cast<float>(b.width) + spread ||
+                 v > static_cast<float>(b.height) + spread));
+    };
+    for (const Group& group : groups_) {
+        if (outOfSight(group.box.center(), group.box.diagonal().norm() / 2)) {
             continue;
         }
-        seen.push_back(&block);
-        for (const SurfaceCell& cell : block.block->cells) {
-            const Eigen::Vector3f p = rotation * cell.position + translation;
-            if (p.z() < 0.05F || p.z() > farLimit) {
-                continue;
+        for (const std::uint32_t i : group.blocks) {
+            if (!outOfSight(blocks_[i].centre, blocks_[i].radius)) {
+                seen.push_back(&blocks_[i]);
             }
-            b.splat(p, half);
+        }
+    }
+    std::sort(seen.begin(), seen.end());  // in the blocks' own order
+    for (const BlockView* block : seen) {
+        for (const Eigen::Vector3f& position : block->block->positions) {
+            const Eigen::Vector3f p = rotation * position + translation;
+            if (p.z() >= 0.05F && p.z() <= farLimit) {
+                b.splat(p, half);
+            }
         }
     }
     return b;
@@ -246,6 +278,7 @@ ViewScore ViewScorer::scoreEvery(std::size_t stride, int rayStride,
                 continue;
             }
             result.openGain += static_cast<double>(stride) * b.area;
+            result.coarseGain += static_cast<double>(stride) * b.coarseArea;
             if (b.quality > 0.5) {
                 result.cells.push_back(record.cell.key);
             }
@@ -254,8 +287,7 @@ ViewScore ViewScorer::scoreEvery(std::size_t stride, int rayStride,
     std::sort(result.cells.begin(), result.cells.end());
     const double side = static_cast<double>(kPixels * rayStride) / camera.fx;
     forEachUnknown(world_T_camera, buffer, rayStride, [&](const Eigen::Vector3d&, double depth) {
-        const double z = std::min(depth, kNewSurfaceDepth * goodDepth_);
-        result.unknownGain += side * side * z * z;
+        result.unknownGain += side * side * depth * depth * newSurfaceShare(depth);
     });
     result.unknownGain *= weights_.unknown;
     result.gain = result.openGain + result.unknownGain;
@@ -345,7 +377,7 @@ ViewScorer::Seen ViewScorer::sights(const Pose& world_T_camera) const {
         const double facing = static_cast<double>(ray.dot(frontier_[i].area.normalized()));
         const double angle = std::clamp(2.0 * facing, 0.0, 1.0);
         const auto z = static_cast<double>(places[i].z());
-        const double afar = std::min(1.0, std::pow(kNewSurfaceDepth * goodDepth_ / z, 2));
+        const double afar = newSurfaceShare(z);
         put(2 * (open_.size() + i), angle * afar);
         put(2 * (open_.size() + i) + 1, angle * std::min(1.0, std::pow(goodDepth_ / z, 4)));
     }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "riftmap/stereo/view_builder.h"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <string>
@@ -21,6 +22,22 @@ void fillMissingSigma(DisparityImage& image, double sigma) {
     for (std::size_t i = 0; i < image.sigma.size(); ++i) {
         if (std::isfinite(image.disparity[i]) && !(image.sigma[i] > 0)) {
             image.sigma[i] = static_cast<float>(sigma);
+        }
+    }
+}
+
+/// Gives pixels whose depth is known worse than `most` [m] a deviation with which the map takes
+/// them for no point of the surface: one that is not known within a third of itself.
+void distrustFarPixels(DisparityImage& image, const StereoCamera& camera, double most) {
+    constexpr double kUnknown = 0.34;  // a little more than a third, in spite of rounding
+    for (std::size_t i = 0; i < image.sigma.size(); ++i) {
+        const double d = static_cast<double>(image.disparity[i]);
+        if (!std::isfinite(d) || d + camera.doffs <= 0) {
+            continue;
+        }
+        if (camera.depthSigma(camera.depth(d), static_cast<double>(image.sigma[i])) > most) {
+            image.sigma[i] =
+                std::max(image.sigma[i], static_cast<float>(kUnknown * (d + camera.doffs)));
         }
     }
 }
@@ -47,6 +64,9 @@ View ViewBuilder::build(const StereoObservation& observation) {
     } else {
         throw std::invalid_argument(
             "[Stereo] matcher = given, but the observation brings no disparity");
+    }
+    if (options_.maxDepthSigma > 0) {
+        distrustFarPixels(view.disparity, view.camera, options_.maxDepthSigma);
     }
     return view;
 }

@@ -60,7 +60,8 @@ std::vector<World> worlds() {
         {"rooms", "explore-indoor.ini", {}, {"N0"}, false, 4},
         {"small_house",
          "explore-indoor.ini",
-         {"World.mesh=" + data + "/world_aws_small_house/aws_small_house.obj"},
+         {"World.mesh=" + data + "/world_aws_small_house/aws_small_house.obj",
+          "Planner.background_is_free=true"},  // it has no ceiling
          {"N0"},
          false,
          6},

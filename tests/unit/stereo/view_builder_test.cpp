@@ -140,5 +140,34 @@ TEST(IsolatedFilter, DropsSmallGroupsOnly) {
     EXPECT_FALSE(d.valid(4, 0) || d.valid(1, 1));
 }
 
+TEST(ViewBuilder, depthThatIsKnownTooBadlyIsNoSurface) {
+    StereoObservation o = planeAt(20);
+    o.disparity.emplace();
+    o.disparity->resize(o.camera.width, o.camera.height);
+    for (int c = 0; c < o.camera.width; ++c) {  // the first row: 1, 2, ... px; the rest unmatched
+        o.disparity->disparity[o.disparity->index(c, 0)] = static_cast<float>(c + 1);
+        o.disparity->sigma[o.disparity->index(c, 0)] = 0.1F;
+    }
+    StereoOptions options;
+    const View all = ViewBuilder(options).build(o);
+    EXPECT_EQ(all.disparity.sigma, o.disparity->sigma);
+    options.maxDepthSigma = 0.05;
+    const View view = ViewBuilder(options).build(o);
+    EXPECT_EQ(view.disparity.disparity, o.disparity->disparity);
+    int distrusted = 0;
+    for (int c = 0; c < o.camera.width; ++c) {
+        const float d = view.disparity.at(c, 0);
+        const float sigma = view.disparity.sigma[view.disparity.index(c, 0)];
+        // sigma_z = z^2 sigma_d / (f b), f b = 20: 5 cm at 10 m, 6.3 px.
+        if (static_cast<double>(d) < std::sqrt(20 * 0.1 / 0.05) - 1e-3) {
+            EXPECT_GT(3.0F * sigma, d);  // not known within a third of itself
+            ++distrusted;
+        } else {
+            EXPECT_EQ(sigma, 0.1F);
+        }
+    }
+    EXPECT_EQ(distrusted, 6);
+}
+
 }  // namespace
 }  // namespace riftmap

@@ -22,6 +22,9 @@ struct SensorModel {
     /// Largest depth [m] at which one view measures as finely (pixel spacing) and as accurately
     /// (sigma_z <= resolution / 2) as asked; within the range.
     double goodDepth(double resolution) const;
+    /// Share of surface first seen at this depth that the map has within `resolution` [m] of where
+    /// it is: for noise that is Gaussian along the ray.
+    double shareWithin(double resolution, double depth) const;
     /// Camera at `eye` with a level horizon and `target` in the middle of the true field of view
     /// (the part of the image that has a partner).
     Pose lookingAt(const Eigen::Vector3d& eye, const Eigen::Vector3d& target) const;

@@ -30,6 +30,8 @@ struct PlannerOptions {
         5e-4;             ///< a view that adds less than this share of the surface is not worth it
     int maxAttempts = 4;  ///< views of a tear that may fail before it is given up
     double unknownWeight = 0.5;     ///< of unknown space looked into, against tears to be closed
+    double newSurfaceDepth = 1.5;   ///< good depths up to which new surface counts in full; 0: as
+                                    ///< far as it is within the resolution of where it should be
     double clearanceMargin = 0.02;  ///< beyond the platform's clearance [m]
     int targets = 48;               ///< tears that candidates are made for, in one plan
     int places = 32;                ///< places for candidates that aim at no tear, in one plan
@@ -87,6 +89,7 @@ class Knowledge {
     std::vector<Pose> pathTo(const Pose& goal) const;
 
  private:
+    void updateSurface(FreeSpace& space) const;
     bool fits(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const;
 
     const PixelGraph* graph_;
@@ -108,6 +111,8 @@ class Knowledge {
 struct ViewPlan {
     std::vector<Pose> path;                ///< last: where the view is to be taken
     double gain = 0;                       ///< expected [m^2]
+    double coarseGain = 0;                 ///< part of it: surface known better
+    double unknownGain = 0;                ///< part of it: unknown space looked into
     std::vector<std::uint64_t> cells;      ///< tears that the view is to close
     std::vector<Eigen::Vector3d> unknown;  ///< unknown places that it is to look into
 };

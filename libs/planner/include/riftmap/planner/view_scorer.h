@@ -19,7 +19,8 @@ namespace riftmap {
 /// What a view from some pose would bring.
 struct ViewScore {
     double gain = 0;                   ///< surface that it may add or make better, about [m^2]
-    double openGain = 0;               ///< part of it: tears closed
+    double openGain = 0;               ///< part of it: tears closed and surface known better
+    double coarseGain = 0;             ///< part of that: surface known better
     double unknownGain = 0;            ///< part of it: unknown space looked into
     double nearShare = 0;              ///< of the field of view that is nearer than the near limit
     std::vector<std::uint64_t> cells;  ///< open cells that it sees well, ascending
@@ -31,7 +32,10 @@ class ViewScorer {
  public:
     struct Weights {
         double unknown = 1.0;  ///< of unknown area against that at tears
-        double reach = 1.5;    ///< width of the strip that closing a tear brings, in cells ...
+        /// Good depths up to which new surface counts in full; 0: as far as it comes to lie within
+        /// the resolution of where it is.
+        double newSurfaceDepth = 1.5;
+        double reach = 1.5;  ///< width of the strip that closing a tear brings, in cells ...
         double farthestReach = 4.0;  ///< ... and beyond deep steps at most
         double coarse = 0.35;        ///< of surface known better against surface known at all
         double vain = 0.8;  ///< what is left of the worth of a tear after a view that did not help
@@ -56,6 +60,7 @@ class ViewScorer {
     struct Benefit {
         double area = 0, quality = 0;
         double torn = 0, coarse = 0;  ///< shares of what the tear and its coarse part are worth
+        double coarseArea = 0;        ///< part of the area: surface known better [m^2]
     };
     Benefit benefit(const RiftRecord& record, const Eigen::Vector3d& eye) const;
     /// Share of a tear's worth that is left after the views of it that did not help.
@@ -100,9 +105,16 @@ class ViewScorer {
         const SurfaceSummary::Block* block;
         std::size_t firstOpen, lastOpen;  ///< range in open_
     };
+    /// Blocks that lie together, so that those out of sight are passed over together.
+    struct Group {
+        Eigen::AlignedBox3f box;
+        std::vector<std::uint32_t> blocks;  ///< indices in blocks_
+    };
     struct DepthBuffer;
 
+    void groupBlocks();
     DepthBuffer draw(const Pose& camera_T_world, std::vector<const BlockView*>& seen) const;
+    double newSurfaceShare(double distance) const;
     double nearShareOf(const DepthBuffer& buffer) const;
     bool visible(const DepthBuffer& buffer, const Eigen::Vector3f& inCamera, float slack) const;
     template <class F>
@@ -117,6 +129,7 @@ class ViewScorer {
     double resolution_;
     double goodDepth_;
     std::vector<BlockView> blocks_;
+    std::vector<Group> groups_;
     std::vector<const RiftRecord*> open_;  ///< by block, then key
     std::vector<FreeSpace::Frontier> frontier_;
     double frontierEdge_ = 0;  ///< of its voxels [m]
