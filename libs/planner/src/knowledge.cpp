@@ -135,7 +135,10 @@ void Knowledge::update(const View& view) {
     ++views_;
     camera_ = view.world_T_camera;
     sensor_ = SensorModel::of(view, limits_);
-    summary_.update(*graph_, view);
+    if (surfaceBox_) {
+        seenThrough_.add(view, sensor_, options_.backgroundIsFree);
+    }
+    summary_.update(*graph_, view, surfaceBox_ ? &seenThrough_ : nullptr);
     ledger_.update(summary_);
     // The camera is here with its clearance; two voxels more let it take the first step without
     // having looked straight up and down. Surface that is seen in them counts all the same.

@@ -99,9 +99,12 @@ ViewScore Choice::scoreAround(const Pose& pose) const {
     score.gain = SeenItems(worth_).gain(TourView{seen.sights, 0});
     for (const Sight& s : seen.sights) {
         const auto cell = scorer_.cellOf(s.item);
+        const auto gain = static_cast<double>(worth_[s.item] * s.share);
         if (!cell) {
+            score.unknownGain += gain;
             continue;
         }
+        score.openGain += ViewScorer::isTear(s.item) ? gain : 0.0;
         // Well enough to count as a try, however little is left of its worth.
         const RiftRecord& record = *scorer_.open()[*cell];
         if (static_cast<double>(s.share) > 0.25 * scorer_.leftAfterTries(record)) {

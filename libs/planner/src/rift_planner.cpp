@@ -16,17 +16,19 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
-ViewScorer::Weights weightsFor(const Knowledge& k) {
+ViewScorer::Weights weightsFor(const Knowledge& k, const ObjectMemory& memory) {
     ViewScorer::Weights weights;
     weights.unknown = k.options().unknownWeight;
     weights.newSurfaceDepth = k.options().newSurfaceDepth;
     if (k.surfaceBox()) {
         // Unseen surface counts where it may be (the frontier), so the rims of the surface seen
         // stand for holes that are smaller than that, and coarse surface is mostly covered. All so
-        // that gains come true: predicted against measured on two objects.
+        // that gains come true: predicted against measured on five objects.
         weights.reach = 0.3;
         weights.coarse = 0.15;
-        weights.vain = weights.vainUnmatched = 0.6;
+        weights.unknown *= memory.frontier.share();
+        weights.hidden = 0.65 * memory.tears.share();
+        weights.vain = weights.vainUnmatched = 0.4;
     }
     return weights;
 }
@@ -39,10 +41,12 @@ Eigen::Vector3d anyPerpendicular(const Eigen::Vector3d& n) {
     return n.cross(axis).normalized();
 }
 
-Choice::Choice(Knowledge& knowledge, std::vector<Pose>& pool)
+Choice::Choice(Knowledge& knowledge, std::vector<Pose>& pool, ObjectMemory& memory)
     : k_(knowledge),
       pool_(pool),
-      scorer_(k_.sensor(), k_.summary(), k_.ledger(), k_.space(), k_.resolution(), weightsFor(k_)),
+      memory_(memory),
+      scorer_(k_.sensor(), k_.summary(), k_.ledger(), k_.space(), k_.resolution(),
+              weightsFor(k_, memory)),
       random_(k_.options().seed * 1000003U + k_.views()),
       good_(k_.sensor().goodDepth(k_.resolution())) {}
 
@@ -248,6 +252,7 @@ std::optional<ViewPlan> Choice::planFor(const Candidate& c) const {
     ViewPlan plan;
     plan.path = c.path == 0.0 ? std::vector<Pose>{c.pose} : k_.pathTo(c.pose);
     plan.gain = c.score.gain;
+    plan.tearGain = c.score.openGain;
     plan.coarseGain = c.score.coarseGain;
     plan.unknownGain = c.score.unknownGain;
     plan.cells = c.score.cells;
@@ -452,8 +457,45 @@ std::optional<ViewPlan> Choice::make() {
     return lastResorts(minGain());
 }
 
+void PromiseKept::note(double promised, double came, double least) {
+    constexpr double kFade = 0.5;  // the last few views count
+    if (promised < least) {
+        return;
+    }
+    promised_ = kFade * promised_ + promised;
+    came_ = kFade * came_ + std::min(came, most_ * promised);
+    share_ = std::clamp((came_ + 2 * least) / (promised_ + 2 * least), 0.05, most_);
+}
+
+/// Holds what the last view promised against the surface that it brought.
+void ObjectMemory::update(const SurfaceSummary& summary, double minGain) {
+    const double cell = summary.cellSize() * summary.cellSize();
+    const std::size_t now = summary.cellCount();
+    const double came = now > cells ? static_cast<double>(now - cells) * cell : 0.0;
+    const double promised = frontierGain + tearGain;
+    if (promised > 0) {
+        const double least = minGain * static_cast<double>(now) * cell;
+        // As they were promised, so they are taken to have come.
+        const double part = came / promised;
+        const double ofFrontier = frontierGain / frontier.share();
+        const double ofTears = tearGain / tears.share();
+        frontier.note(ofFrontier, part * frontierGain, least);
+        tears.note(ofTears, part * tearGain, least);
+    }
+    cells = now;
+}
+
 std::optional<ViewPlan> RiftPlanner::next(Knowledge& knowledge) {
-    return Choice(knowledge, pool_).make();
+    if (!knowledge.surfaceBox()) {
+        return Choice(knowledge, pool_, memory_).make();
+    }
+    memory_.update(knowledge.summary(), knowledge.options().minGain);
+    auto plan = Choice(knowledge, pool_, memory_).make();
+    if (plan) {
+        memory_.frontierGain = plan->unknownGain;
+        memory_.tearGain = plan->tearGain;
+    }
+    return plan;
 }
 
 }  // namespace riftmap

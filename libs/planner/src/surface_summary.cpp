@@ -31,7 +31,9 @@ struct Sums {
     Eigen::Vector3d position = Eigen::Vector3d::Zero(), normal = Eigen::Vector3d::Zero();
     Eigen::Vector3d openPosition = Eigen::Vector3d::Zero(), outward = Eigen::Vector3d::Zero();
     Eigen::Vector3d tornNormal = Eigen::Vector3d::Zero(), coarseNormal = Eigen::Vector3d::Zero();
-    double jump = 0, doubt = 0;
+    double jump = 0, doubt = 0, hidden = 0;
+    Eigen::Vector3d hiddenPosition = Eigen::Vector3d::Zero();
+    std::uint32_t hides = 0;
     std::uint32_t vertices = 0, torn = 0, coarse = 0, open = 0, high = 0;
     std::uint8_t kinds = 0;
 };
@@ -53,14 +55,23 @@ Eigen::Vector3d outwardAt(const PixelGraph& graph, VertexId id, const Vertex& v,
     return length > 1.0 ? Eigen::Vector3d(sum / length) : sum;
 }
 
+/// Longest edge to a neighbour on the same surface [m].
+double spacingAt(const PixelGraph& graph, VertexId id) {
+    double longest = 1e-6;
+    graph.forEachEdge(id, [&](VertexId, float weight, bool high) {
+        longest = high ? longest : std::max(longest, static_cast<double>(weight));
+    });
+    return longest;
+}
+
 /// Share of the surface at a coarse vertex that is not within the resolution of the map: for its
-/// noise is Gaussian along the ray, and a little for what lies between vertices that are too far
-/// apart.
-double shareInDoubt(float sigma, double resolution) {
-    constexpr double kBetween = 0.05;
-    return kBetween + (sigma > 0
-                           ? std::erfc(resolution / (std::sqrt(2.0) * static_cast<double>(sigma)))
-                           : 0.0);
+/// noise is Gaussian along the ray, and for what lies between vertices that are too far apart.
+double shareInDoubt(float sigma, double spacing, double resolution) {
+    constexpr double kAcross = 0.75;  // part of an error along the ray that is off the surface
+    const double between = std::clamp(1.0 - 1.6 * resolution / spacing, 0.005, 1.0);
+    return between + (sigma > 0 ? std::erfc(resolution /
+                                            (std::sqrt(2.0) * kAcross * static_cast<double>(sigma)))
+                                : 0.0);
 }
 
 SurfaceCell toCell(const Sums& s, std::uint64_t key, double cell) {
@@ -89,6 +100,11 @@ SurfaceCell toCell(const Sums& s, std::uint64_t key, double cell) {
     }
     if (s.torn > 0) {
         c.outward = (s.outward / s.torn).cast<float>();
+        const double most = std::min(1.0, 2.0 * cell / (s.torn * spacing));
+        c.hidden = static_cast<float>(s.hidden * spacing * most);
+        if (s.hides > 0) {
+            c.hiddenPosition = (s.hiddenPosition / s.hides).cast<float>();
+        }
     }
     return c;
 }
@@ -150,7 +166,7 @@ const SurfaceCell* SurfaceSummary::find(std::uint64_t key) const {
     return c != cells.end() && c->key == key ? &*c : nullptr;
 }
 
-void SurfaceSummary::update(const PixelGraph& graph, const View& view) {
+void SurfaceSummary::update(const PixelGraph& graph, const View& view, const SeenThrough* seen) {
     const double side = kCellsPerSide * cell_;
     const auto blockAt = [&](const Eigen::Vector3d& p) {
         return pack((p / side).array().floor().cast<int>());
@@ -200,7 +216,7 @@ void SurfaceSummary::update(const PixelGraph& graph, const View& view) {
     changed_.erase(std::unique(changed_.begin(), changed_.end()), changed_.end());
     std::vector<Block> rebuilt(changed_.size());
     tbb::parallel_for(std::size_t{0}, changed_.size(),
-                      [&](std::size_t i) { rebuilt[i] = build(graph, changed_[i]); });
+                      [&](std::size_t i) { rebuilt[i] = build(graph, changed_[i], seen); });
     former_.assign(changed_.size(), {});
     for (std::size_t i = 0; i < changed_.size(); ++i) {
         const auto it = blocks_.find(changed_[i]);
@@ -217,7 +233,8 @@ void SurfaceSummary::update(const PixelGraph& graph, const View& view) {
     }
 }
 
-SurfaceSummary::Block SurfaceSummary::build(const PixelGraph& graph, std::uint64_t blockKey) const {
+SurfaceSummary::Block SurfaceSummary::build(const PixelGraph& graph, std::uint64_t blockKey,
+                                            const SeenThrough* seen) const {
     constexpr int n = kCellsPerSide;
     const Eigen::Vector3i corner = unpack(blockKey) * n;
     const Eigen::Vector3d min = corner.cast<double>() * cell_;
@@ -242,11 +259,20 @@ SurfaceSummary::Block SurfaceSummary::build(const PixelGraph& graph, std::uint64
         s.openPosition += p;
         if ((v.open & ~kTooCoarse) != 0) {
             ++s.torn;
-            s.outward += outwardAt(graph, id, v, s);
+            const Eigen::Vector3d outward = outwardAt(graph, id, v, s);
+            s.outward += outward;
+            if (seen != nullptr && outward.norm() > 0.25 && v.normal.norm() > 0.5F) {
+                if (const auto gap = gapBeside(graph, *seen, p, v.normal.cast<double>(),
+                                               outward.normalized(), resolution_)) {
+                    s.hidden += gap->width;
+                    s.hiddenPosition += gap->place;
+                    ++s.hides;
+                }
+            }
             s.tornNormal += v.normal.cast<double>();
         } else {
             ++s.coarse;
-            s.doubt += shareInDoubt(v.sigma, resolution_);
+            s.doubt += shareInDoubt(v.sigma, spacingAt(graph, id), resolution_);
             s.coarseNormal += v.normal.cast<double>();
         }
     });

@@ -24,7 +24,7 @@ Eigen::Vector3d anyPerpendicular(const Eigen::Vector3d& n);
 /// One plan: makes candidates, scores them, picks.
 class Choice {
  public:
-    Choice(Knowledge& knowledge, std::vector<Pose>& pool);
+    Choice(Knowledge& knowledge, std::vector<Pose>& pool, ObjectMemory& memory);
 
     std::optional<ViewPlan> make();
 
@@ -63,6 +63,7 @@ class Choice {
 
     Knowledge& k_;
     std::vector<Pose>& pool_;
+    ObjectMemory& memory_;
     ViewScorer scorer_;
     std::mt19937 random_;
     double good_;

@@ -303,19 +303,14 @@ std::vector<Eigen::Vector3d> ViewScorer::unknownSeen(const Pose& world_T_camera)
     return places;
 }
 
-double ViewScorer::hiddenWidth(const SurfaceCell& cell) const {
-    constexpr double kShallow = 2, kDeep = 8;  // [resolutions]
-    constexpr double kLeast = 0.02;
-    const double depth = static_cast<double>(cell.jump) / resolution_;
-    const double share = std::clamp((depth - kShallow) / (kDeep - kShallow), kLeast, 1.0);
-    return weights_.reach * share * summary_->cellSize();
-}
-
 std::vector<float> ViewScorer::worth() const {
+    // What is uncovered along rims that seem to hide nothing, on average.
+    constexpr float kBesideRim = 3e-4F;  // [m]
+    const auto hidden = static_cast<float>(weights_.hidden);
     std::vector<float> worth;
     worth.reserve(2 * (open_.size() + frontier_.size()));
     for (const RiftRecord* record : open_) {
-        worth.push_back(record->cell.rim * static_cast<float>(hiddenWidth(record->cell)));
+        worth.push_back(hidden * record->cell.hidden + kBesideRim * record->cell.rim);
         worth.push_back(record->cell.doubt);
     }
     for (const FreeSpace::Frontier& f : frontier_) {
@@ -360,7 +355,10 @@ ViewScorer::Seen ViewScorer::sights(const Pose& world_T_camera) const {
     const auto margin = static_cast<float>(2.0 * summary_->cellSize());
     for (const BlockView* block : seen) {
         for (std::size_t i = block->firstOpen; i < block->lastOpen; ++i) {
-            const Eigen::Vector3f p = rotation * open_[i]->cell.openPosition + translation;
+            const SurfaceCell& cell = open_[i]->cell;
+            const Eigen::Vector3f p =
+                rotation * (cell.hidden > 0 ? cell.hiddenPosition : cell.openPosition) +
+                translation;
             if (visible(buffer, p, margin)) {
                 const Benefit b = benefit(*open_[i], world_T_camera.translation);
                 put(2 * i, b.torn);

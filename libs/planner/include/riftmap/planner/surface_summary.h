@@ -10,6 +10,7 @@
 
 #include "riftmap/core/view.h"
 #include "riftmap/graph/pixel_graph.h"
+#include "riftmap/planner/seen_through.h"
 
 namespace riftmap {
 
@@ -32,7 +33,11 @@ struct SurfaceCell {
     float rim = 0;     ///< length of the tear in this cell, about [m]
     float jump = 0;    ///< mean length of the high edges across it [m]; 0 where none is left
     float coarse = 0;  ///< area sampled too sparsely or known too badly, about [m^2]
-    float doubt = 0;   ///< part of it that is probably farther from the map than was asked [m^2]
+    /// Area that the tear may hide, counted from both its sides; 0 where `seen` was not given
+    /// [m^2].
+    float hidden = 0;
+    Eigen::Vector3f hiddenPosition = Eigen::Vector3f::Zero();  ///< mean of where it begins
+    float doubt = 0;  ///< part of it that is probably farther from the map than was asked [m^2]
 };
 
 /// The map as the planner looks at it: a few thousand cells instead of millions of vertices, kept
@@ -45,8 +50,9 @@ class SurfaceSummary {
     SurfaceSummary(double cell, double resolution);
 
     double cellSize() const { return cell_; }
-    /// Sums up anew all blocks of cells that this view has surface in or looks through.
-    void update(const PixelGraph& graph, const View& view);
+    /// Sums up anew all blocks of cells that this view has surface in or looks through. `seen`:
+    /// what all views saw through, for `hidden`.
+    void update(const PixelGraph& graph, const View& view, const SeenThrough* seen = nullptr);
 
     struct Block {
         Eigen::AlignedBox3d box;         ///< of the cube of cells
@@ -79,7 +85,7 @@ class SurfaceSummary {
  private:
     static constexpr int kCellsPerSide = 8;
 
-    Block build(const PixelGraph& graph, std::uint64_t blockKey) const;
+    Block build(const PixelGraph& graph, std::uint64_t blockKey, const SeenThrough* seen) const;
 
     double cell_, resolution_;
     std::map<std::uint64_t, Block> blocks_;

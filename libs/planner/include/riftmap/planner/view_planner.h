@@ -98,6 +98,7 @@ class Knowledge {
     std::optional<Eigen::AlignedBox3d> surfaceBox_;
     Eigen::AlignedBox3d cameraBox_;
     SensorModel sensor_;
+    SeenThrough seenThrough_;
     SurfaceSummary summary_;
     FreeSpace space_;
     std::optional<FreeSpace> hull_;
@@ -111,6 +112,7 @@ class Knowledge {
 struct ViewPlan {
     std::vector<Pose> path;                ///< last: where the view is to be taken
     double gain = 0;                       ///< expected [m^2]
+    double tearGain = 0;                   ///< part of it: tears closed, with coarseGain
     double coarseGain = 0;                 ///< part of it: surface known better
     double unknownGain = 0;                ///< part of it: unknown space looked into
     std::vector<std::uint64_t> cells;      ///< tears that the view is to close
@@ -128,6 +130,31 @@ class ViewPlanner {
     virtual std::string whyNone() const { return "complete"; }
 };
 
+/// What came of one kind of gain that views of an object promised.
+class PromiseKept {
+ public:
+    /// `most`: greatest share.
+    explicit PromiseKept(double most) : most_(most) {}
+    /// A view promised this much more surface and brought so much [m^2]; promises below `least`
+    /// say nothing.
+    void note(double promised, double came, double least);
+    /// Part of a promise that comes true, going by the last few; 1 before the first.
+    double share() const { return share_; }
+
+ private:
+    double most_;
+    double promised_ = 0, came_ = 0;
+    double share_ = 1;
+};
+
+/// What the planner of an object keeps from plan to plan.
+struct ObjectMemory {
+    PromiseKept frontier{1.0}, tears{2.5};
+    double frontierGain = 0, tearGain = 0;  ///< expected of the last view [m^2]
+    std::size_t cells = 0;                  ///< of the summary before it
+    void update(const SurfaceSummary& summary, double minGain);
+};
+
 /// The default planner: views that bring most for their way (see doc/algorithm).
 class RiftPlanner : public ViewPlanner {
  public:
@@ -136,6 +163,7 @@ class RiftPlanner : public ViewPlanner {
 
  private:
     std::vector<Pose> pool_;  ///< good views that were not taken yet
+    ObjectMemory memory_;
 };
 
 }  // namespace riftmap

@@ -38,6 +38,7 @@ class ViewScorer {
         double reach = 1.5;  ///< width of the strip that closing a tear brings, in cells ...
         double farthestReach = 4.0;  ///< ... and beyond deep steps at most
         double coarse = 0.35;        ///< of surface known better against surface known at all
+        double hidden = 0.65;  ///< of what tears of an object may hide: the part that is there
         double vain = 0.8;  ///< what is left of the worth of a tear after a view that did not help
         /// The same where pixels beside it had no disparity: what did not match once will hardly
         /// match from elsewhere, while what was hidden may be seen from another side.
@@ -85,6 +86,8 @@ class ViewScorer {
     /// What a view would see of them. Surface known and unknown hides what lies behind it.
     /// Thread-safe.
     Seen sights(const Pose& world_T_camera) const;
+    /// Of a cell's two items or a place's, the first.
+    static bool isTear(std::uint32_t item) { return item % 2 == 0; }
     /// Index of an item's open cell in open(), or nothing.
     std::optional<std::size_t> cellOf(std::uint32_t item) const;
     /// Index of an item's place in frontier(), or nothing.
@@ -94,10 +97,6 @@ class ViewScorer {
     static constexpr std::size_t kMostOpen = 6000;  ///< open cells that an estimate weighs
 
     ViewScore scoreEvery(std::size_t stride, int rayStride, const Pose& world_T_camera) const;
-    /// Width of what is hidden at a tear of an object, on average [m]. What lies less than two
-    /// resolutions behind a step is within one of the surface on either side of it, and where
-    /// there is no step the frontier counts what may lie beyond.
-    double hiddenWidth(const SurfaceCell& cell) const;
 
     struct BlockView {
         Eigen::Vector3f centre;
