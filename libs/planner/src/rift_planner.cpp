@@ -459,12 +459,12 @@ std::optional<ViewPlan> Choice::make() {
 
 void PromiseKept::note(double promised, double came, double least) {
     constexpr double kFade = 0.5;  // the last few views count
-    if (promised < least) {
+    if (promised < 0.25 * least) {
         return;
     }
     promised_ = kFade * promised_ + promised;
     came_ = kFade * came_ + std::min(came, most_ * promised);
-    share_ = std::clamp((came_ + 2 * least) / (promised_ + 2 * least), 0.05, most_);
+    share_ = std::clamp((came_ + 0.5 * least) / (promised_ + 0.5 * least), 0.05, most_);
 }
 
 /// Holds what the last view promised against the surface that it brought.

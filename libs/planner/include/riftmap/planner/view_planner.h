@@ -135,8 +135,8 @@ class PromiseKept {
  public:
     /// `most`: greatest share.
     explicit PromiseKept(double most) : most_(most) {}
-    /// A view promised this much more surface and brought so much [m^2]; promises below `least`
-    /// say nothing.
+    /// A view promised this much more surface and brought so much [m^2]; promises below a
+    /// quarter of `least` say nothing, smaller sums than it little.
     void note(double promised, double came, double least);
     /// Part of a promise that comes true, going by the last few; 1 before the first.
     double share() const { return share_; }
