@@ -79,9 +79,6 @@ void ExploreProgram::run() {
                     directory.path().c_str(), reason->c_str());
         return;
     }
-    // From here on it is the directory of a run that has not ended.
-    std::filesystem::remove(directory.file("summary.yaml"));
-    writeAtomically(directory.file("config_used.ini"), [&](std::ostream& o) { o << config; });
     explore(directory);
 }
 

@@ -2,6 +2,7 @@
 #include "explore_record.h"
 
 #include <algorithm>
+#include <fstream>
 #include <map>
 #include <set>
 #include <sstream>
@@ -169,18 +170,34 @@ std::optional<std::string> howItEnded(const RunDirectory& directory, const std::
     return reason == "interrupted" || (limit && !sameLimits) ? std::nullopt : std::optional(reason);
 }
 
+namespace {
+
+/// Before anything is cut.
+void checkHeader(const fs::path& steps) {
+    std::ifstream in(steps);
+    std::string header;
+    if (std::getline(in, header) && !header.ends_with(",seconds") &&
+        header.find(",seconds,") == std::string::npos) {
+        throw FileError(steps.string() +
+                        ":1: no column 'seconds': recorded by another version; nothing is changed");
+    }
+}
+
+}  // namespace
+
 ExploreRecord salvageRecord(const RunDirectory& directory, bool rawlog,
                             const std::vector<double>& deltas) {
     ExploreRecord record;
     const fs::path steps = directory.file("steps.csv");
     const fs::path curve = directory.file("coverage.csv");
     const fs::path trajectory = directory.file("trajectory.tum");
+    checkHeader(steps);
     std::size_t rows = std::min(withoutHeader(wholeLines(steps)), wholeLines(trajectory));
     if (!deltas.empty()) {
         rows = std::min(rows, withoutHeader(wholeLines(curve)));
     }
     if (rawlog) {
-        record.observations = salvageRawlog(directory.file("run.rawlog"));
+        record.observations = salvageRawlog(directory.file("run.rawlog"), rows > 0);
         rows = std::min(rows, record.observations);
     }
     keepLines(trajectory, rows);

@@ -2,6 +2,7 @@
 // What an interrupted exploring run has left behind, for the run that goes on with it.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <optional>
 #include <string>
@@ -30,6 +31,7 @@ struct ExploreRecord {
     std::vector<StepRow> rows;     ///< times and coverage alone; not more than observations
     std::vector<std::vector<Coverage>> coverage;  ///< of each row; empty without a judge
     double seconds() const { return rows.empty() ? 0.0 : rows.back().seconds; }
+    std::size_t views() const { return std::max(rows.size(), observations); }
 };
 
 /// Reads it, and cuts the files of the directory behind the last view that is whole in all of them:

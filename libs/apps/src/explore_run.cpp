@@ -86,7 +86,8 @@ ExploreRun::ExploreRun(ExploreProgram& program, RunDirectory& directory, bool re
       directory_(directory),
       platform_(makePlatform(program.simulation_, program.seed())),
       map_(program.graph_, program.stereo_),
-      builder_(program.stereo_) {
+      builder_(program.stereo_),
+      resumed_(resumed) {
     PlannerOptions options = program.planner_;
     if (program.explore_.knownBox) {
         target_ = boxAround(platform_->world().mesh);
@@ -231,6 +232,9 @@ std::vector<Coverage> ExploreRun::coverageAfter(const ExploreStep& step) {
 void ExploreRun::onStep(const ExploreStep& measured, const Knowledge& knowledge) {
     const bool known = measured.view < record_.rows.size();
     ExploreStep step = measured;
+    if (measured.view >= record_.views()) {
+        takeOver();
+    }
     if (known) {  // the times of then
         const StepRow& then = record_.rows[step.view];
         step.stereoMs = then.stereoMs;
@@ -304,22 +308,36 @@ void ExploreRun::showProgress(const ExploreStep& step, const Knowledge& knowledg
 
 void ExploreRun::run(const std::atomic<bool>& interrupt) {
     try {
-        explorer_->run(interrupt, record_.seconds());
+        explorer_->run(interrupt, record_.seconds(), record_.views());
     } catch (const CollisionError& e) {
         finish(e.what());
         throw;
     }
-    if (explorer_->stopReason() == "interrupted" && replay_->replays()) {
+    if (explorer_->stopReason() == "interrupted" && explorer_->views() < record_.views()) {
         program_.stopReason = explorer_->stopReason();
         std::cerr << directory_.path().string()
                   << ": interrupted before there was a new view; nothing is changed\n";
-        rawlog_->finish();
+        if (rawlog_) {
+            rawlog_->finish();
+        }
         return;
     }
     finish({});
 }
 
+/// From the first new view on it is the directory of a run that has not ended, with these limits.
+void ExploreRun::takeOver() {
+    if (resumed_) {
+        std::filesystem::remove(directory_.file("summary.yaml"));
+        const std::string config = program_.table().dump();
+        writeAtomically(directory_.file("config_used.ini"),
+                        [&](std::ostream& out) { out << config; });
+    }
+    resumed_ = false;
+}
+
 void ExploreRun::finish(const std::string& error) {
+    takeOver();
     program_.stopReason = error.empty() ? explorer_->stopReason() : "collision";
     program_.views = explorer_->views();
     program_.pathLength = explorer_->pathLength();

@@ -47,6 +47,7 @@ class ExploreRun {
     void writeCells() const;
     YamlMap figures(const std::string& error);
     void showProgress(const ExploreStep& step, const Knowledge& knowledge) const;
+    void takeOver();
     void finish(const std::string& error);
     void writeReport() const;
     void writePictureOfView(std::size_t number);
@@ -61,6 +62,7 @@ class ExploreRun {
     std::unique_ptr<SimulatedPlatform> platform_;
     PixelGraphMap map_;
     ViewBuilder builder_;
+    bool resumed_;
     ExploreRecord record_;  ///< of the run that this one goes on with; else empty
     std::unique_ptr<RunRecorder> recorder_;
     std::unique_ptr<ReplayingPlatform> replay_;

@@ -105,7 +105,9 @@ class RawlogWriter::Impl {
     ~Impl() {
         stream_.close();
         std::error_code ignored;  // it is gone after finish()
-        std::filesystem::remove(part_, ignored);
+        if (!holdsViews_) {
+            std::filesystem::remove(part_, ignored);
+        }
     }
     Impl(const Impl&) = delete;
     Impl& operator=(const Impl&) = delete;
@@ -135,6 +137,7 @@ class RawlogWriter::Impl {
     /// What is written so far gets to the disk. The compressor would keep a hundred views to
     /// itself; a file of several compressed members is one file to all who read it.
     void flush() {
+        holdsViews_ = true;
         stream_.close();
     }
 
@@ -183,6 +186,7 @@ class RawlogWriter::Impl {
     std::filesystem::path file_, part_, folder_;
     Images images_;
     mrpt::io::CFileGZOutputStream stream_;
+    bool holdsViews_ = false;  ///< that whoever salvages the file can read
     std::size_t count_ = 0;
 };
 
@@ -255,11 +259,15 @@ std::size_t copyViews(const std::filesystem::path& from, const std::filesystem::
 
 }  // namespace
 
-std::size_t salvageRawlog(const std::filesystem::path& file) {
+std::size_t salvageRawlog(const std::filesystem::path& file, bool someExpected) {
     namespace fs = std::filesystem;
     const fs::path part = partOf(file);
     const fs::path whole = file.string() + ".whole";
     const std::size_t views = copyViews(fs::exists(part) ? part : file, whole);
+    if (views == 0 && someExpected) {
+        throw FileError(file.string() +
+                        ": missing, or no view of it can be read; nothing is changed");
+    }
     if (views > 0) {
         fs::rename(whole, file);
     } else {

@@ -196,7 +196,7 @@ HWY_INLINE void storeCodes(VI codes, M there, std::uint16_t* at) {
 /// What the page's vertices are to become, a slot a value.
 struct Fused {
     alignas(64) std::array<float, Page::kSize> gain{};  ///< weight of the pixel; 0 = not matched
-    alignas(64) std::array<std::uint32_t, Page::kSize> look;
+    alignas(64) std::array<std::uint32_t, Page::kSize> look{};
 };
 
 /// Colours byte by byte; the compiler makes vectors of this itself.

@@ -27,7 +27,7 @@ bool BucketQueue::advance() {
         return false;
     }
     spread();
-    return true;
+    return !bucket().empty();  // so that the search ends on keys that are not finite, too
 }
 
 /// Of some of the waiting keys, evenly taken: of any such choice it is near enough.

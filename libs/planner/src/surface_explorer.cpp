@@ -150,11 +150,12 @@ void SurfaceExplorer::move(ViewPlan& plan) {
     pathLength_ += length;
 }
 
-void SurfaceExplorer::run(const std::atomic<bool>& interrupt, double secondsBefore) {
+void SurfaceExplorer::run(const std::atomic<bool>& interrupt, double secondsBefore,
+                          std::size_t viewsBefore) {
     const auto start = Clock::now();
     clock_ = [=] { return secondsBefore + msSince(start) / 1000.0; };
     look(std::nullopt, 0.0);
-    while (!limitReached(clock_())) {
+    while (views() < viewsBefore || !limitReached(clock_())) {
         if (interrupt) {
             stopReason_ = "interrupted";
             break;

@@ -135,7 +135,8 @@ class LookOutTwin : public testing::TestWithParam<std::uint32_t> {
 TEST_P(LookOutTwin, findsWhatAllVerticesLeaveInSight) {
     SCOPED_TRACE("seed " + std::to_string(GetParam()));
     std::vector<Pose> pool;
-    const Choice choice(knowledge, pool);
+    ObjectMemory memory;
+    const Choice choice(knowledge, pool, memory);
     const double stride = std::max(kResolution, 0.5 * knowledge.space().voxelSize());
     int found = 0;
     int hidden = 0;
@@ -173,7 +174,8 @@ TEST_P(LookOutTwin, findsWhatAllVerticesLeaveInSight) {
 TEST_P(LookOutTwin, looksToAllSidesBeforeItSaysHidden) {
     SCOPED_TRACE("seed " + std::to_string(GetParam()));
     std::vector<Pose> pool;
-    Choice choice(knowledge, pool);
+    ObjectMemory memory;
+    Choice choice(knowledge, pool, memory);
     std::size_t some = 0;
     for (const RiftRecord* record : someOpen()) {
         const Eigen::Vector3d p = record->cell.openPosition.cast<double>();

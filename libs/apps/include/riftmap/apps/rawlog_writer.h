@@ -36,7 +36,9 @@ class RawlogWriter {
     /// Throws FileError where the file cannot be made (or read, to append).
     explicit RawlogWriter(const std::filesystem::path& file, Images images = Images::kEmbedded,
                           Mode mode = Mode::kNew);
-    ~RawlogWriter();  ///< without finish(): nothing is left behind but images
+    /// Without finish(): nothing is left behind but images and, if there are any, the views of
+    /// view() and write() in FILE.part.
+    ~RawlogWriter();
     RawlogWriter(const RawlogWriter&) = delete;
     RawlogWriter& operator=(const RawlogWriter&) = delete;
 
@@ -69,8 +71,8 @@ class RawlogWriter {
 /// Makes FILE of what a recording that was killed has left behind (FILE.part, or FILE itself): the
 /// views that are whole, as RawlogWriter::write() put them there. Returns how many; where there are
 /// none, or no file at all, there is no FILE afterwards. Throws FileError where it cannot be
-/// written.
-std::size_t salvageRawlog(const std::filesystem::path& file);
+/// written, and, changing nothing, where there is no view although `someExpected`.
+std::size_t salvageRawlog(const std::filesystem::path& file, bool someExpected = false);
 
 /// A rectified pair as an MRPT observation: calibration, images (copied), time, label and the pose
 /// of the camera on the robot.

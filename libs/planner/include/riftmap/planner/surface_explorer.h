@@ -61,7 +61,9 @@ class SurfaceExplorer {
     /// Runs to the end; `interrupt` (e.g. set by a signal handler) ends it after the view at work.
     /// Throws CollisionError where the platform hits something; the map is complete up to there.
     /// @param secondsBefore of running that count, too: of the run that this one goes on with
-    void run(const std::atomic<bool>& interrupt, double secondsBefore = 0);
+    /// @param viewsBefore of that run: no limit ends this one before it has taken them again
+    void run(const std::atomic<bool>& interrupt, double secondsBefore = 0,
+             std::size_t viewsBefore = 0);
 
     /// The planner's reason ("complete", "no_reachable_pose"), "max_views", "max_metres",
     /// "max_seconds", "interrupted".
