@@ -87,7 +87,8 @@ ExploreRun::ExploreRun(ExploreProgram& program, RunDirectory& directory, bool re
       platform_(makePlatform(program.simulation_, program.seed())),
       map_(program.graph_, program.stereo_),
       builder_(program.stereo_),
-      resumed_(resumed) {
+      resumed_(resumed),
+      config_(program.table().dump()) {
     PlannerOptions options = program.planner_;
     if (program.explore_.knownBox) {
         target_ = boxAround(platform_->world().mesh);
@@ -329,9 +330,8 @@ void ExploreRun::run(const std::atomic<bool>& interrupt) {
 void ExploreRun::takeOver() {
     if (resumed_) {
         std::filesystem::remove(directory_.file("summary.yaml"));
-        const std::string config = program_.table().dump();
         writeAtomically(directory_.file("config_used.ini"),
-                        [&](std::ostream& out) { out << config; });
+                        [&](std::ostream& out) { out << config_; });
     }
     resumed_ = false;
 }

@@ -63,6 +63,7 @@ class ExploreRun {
     PixelGraphMap map_;
     ViewBuilder builder_;
     bool resumed_;
+    std::string config_;    ///< as given, before a cache is chosen
     ExploreRecord record_;  ///< of the run that this one goes on with; else empty
     std::unique_ptr<RunRecorder> recorder_;
     std::unique_ptr<ReplayingPlatform> replay_;

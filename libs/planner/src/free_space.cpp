@@ -315,69 +315,6 @@ FreeSpace::State FreeSpace::at(const Eigen::Vector3d& point) const {
     return (voxel & (kFreeBit | kKnownBit)) != 0 ? State::kFree : State::kUnknown;
 }
 
-FreeSpace::UnknownRun FreeSpace::firstUnknown(const Eigen::Vector3d& origin,
-                                              const Eigen::Vector3d& direction,
-                                              double length) const {
-    const double step = 0.9 * voxel_;
-    UnknownRun run;
-    for (double s = step; s < length; s += step) {
-        const Eigen::Vector3i v = voxelOf(origin + s * direction);
-        if (!inside(v)) {
-            break;
-        }
-        const std::uint8_t voxel = voxels_[index(v)];
-        const bool known = (voxel & (kFreeBit | kKnownBit | kSurfaceBit)) != 0;
-        if (run.begin < 0 && !known && (voxel >> kTryShift) < kTries) {
-            run.begin = s;
-        } else if (run.begin < 0 && ((voxel & kSurfaceBit) != 0 || !known)) {
-            return {};
-        } else if (run.begin >= 0 && known) {
-            break;
-        }
-        run.end = s;
-    }
-    return run;
-}
-
-std::vector<FreeSpace::Frontier> FreeSpace::frontier(const Eigen::AlignedBox3d& within) const {
-    const auto looks = [&](const Eigen::Vector3i& v) {
-        const std::uint8_t voxel = voxels_[index(v)];
-        return (voxel & kSurfaceBit) == 0 && (voxel & kSeenBit) != 0;
-    };
-    const Eigen::Vector3i first = voxelOf(within.min()).cwiseMax(0);
-    const Eigen::Vector3i last = voxelOf(within.max()).cwiseMin(size_ - Eigen::Vector3i::Ones());
-    std::vector<Frontier> found;
-    for (int z = first.z(); z <= last.z(); ++z) {
-        for (int y = first.y(); y <= last.y(); ++y) {
-            for (int x = first.x(); x <= last.x(); ++x) {
-                const Eigen::Vector3i v(x, y, z);
-                const std::uint8_t voxel = voxels_[index(v)];
-                if ((voxel & (kFreeBit | kKnownBit | kSurfaceBit)) != 0 ||
-                    (voxel >> kTryShift) >= kTries || !within.contains(centre(v))) {
-                    continue;
-                }
-                Eigen::Vector3i out = Eigen::Vector3i::Zero();
-                int faces = 0;
-                for (int axis = 0; axis < 3; ++axis) {
-                    for (const int side : {-1, 1}) {
-                        Eigen::Vector3i w = v;
-                        w[axis] += side;
-                        if (inside(w) && looks(w)) {
-                            out[axis] += side;
-                            ++faces;
-                        }
-                    }
-                }
-                if (faces > 0) {
-                    const auto face = static_cast<float>(voxel_ * voxel_);
-                    found.push_back({centre(v).cast<float>(), face * out.cast<float>()});
-                }
-            }
-        }
-    }
-    return found;
-}
-
 void FreeSpace::noteTry(const Eigen::Vector3d& point) {
     const Eigen::Vector3i v = voxelOf(point);
     if (inside(v) && (voxels_[index(v)] >> kTryShift) < 15) {

@@ -387,10 +387,23 @@ TEST(SimpleMap, AnEmptyOneIsWholeAndAnAbandonedOneLeavesNothing) {
     {
         SimpleMapWriter writer(folder / "never.simplemap");
         writer.add(texturedPair(0));
-        RawlogWriter rawlog(folder / "never.rawlog");
-        rawlog.write(texturedPair(0));
     }
     EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+}
+
+TEST(RawlogWriter, AnAbandonedOneLeavesItsWholeViewsToBeSalvaged) {
+    const TemporaryFolder folder;
+    { const RawlogWriter none(folder / "a.rawlog"); }
+    EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+    {
+        RawlogWriter rawlog(folder / "a.rawlog");
+        rawlog.write(texturedPair(0));
+    }
+    EXPECT_FALSE(std::filesystem::exists(folder / "a.rawlog"));
+    EXPECT_EQ(salvageRawlog(folder / "a.rawlog", true), 1U);
+    EXPECT_TRUE(std::filesystem::exists(folder / "a.rawlog"));
+    EXPECT_EQ(salvageRawlog(folder / "none.rawlog"), 0U);
+    EXPECT_THROW(salvageRawlog(folder / "none.rawlog", true), FileError);
 }
 
 TEST(RawlogWriter, AFullDiskIsNoticed) {

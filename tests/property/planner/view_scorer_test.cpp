@@ -206,40 +206,6 @@ TEST_P(ScorerTwin, anEstimateIsTheSumOfASample) {
     }
 }
 
-/// doc/explorer.md: nothing below two resolutions, 0.3 cells from eight on, between them straight.
-TEST_P(ScorerTwin, aTearIsWorthItsLengthTimesWhatItsStepHides) {
-    SCOPED_TRACE("seed " + std::to_string(GetParam()));
-    constexpr double kCell = 0.08;
-    constexpr double kResolution = 0.02;
-    const Watched watched(GetParam(), kCell, kResolution);
-    ViewScorer::Weights weights{0.5};
-    weights.reach = 0.3;
-    const ViewScorer scorer = watched.scorer(weights);
-    const std::vector<float> worth = scorer.worth();
-    ASSERT_EQ(worth.size(), 2 * scorer.open().size());
-    std::array<int, 3> met{};
-    for (std::size_t i = 0; i < scorer.open().size(); ++i) {
-        const SurfaceCell& cell = scorer.open()[i]->cell;
-        const auto jump = static_cast<double>(cell.jump);
-        double width = 0;
-        if (jump >= 8 * kResolution) {
-            ++met[2];
-            width = 0.3 * kCell;
-        } else if (jump > 2 * kResolution) {
-            ++met[1];
-            width = 0.3 * kCell * (jump - 2 * kResolution) / (6 * kResolution);
-        } else {
-            ++met[0];
-        }
-        const double least = 0.02 * 0.3 * kCell;  // so that it is not forgotten altogether
-        EXPECT_NEAR(worth[2 * i], static_cast<double>(cell.rim) * std::max(width, least), 1e-7);
-        EXPECT_EQ(worth[2 * i + 1], cell.doubt);
-    }
-    EXPECT_GT(met[0], 0);
-    EXPECT_GT(met[1], 0);
-    EXPECT_GT(met[2], 0);
-}
-
 INSTANTIATE_TEST_SUITE_P(Seeds, ScorerTwin, testing::Range(1U, 6U));
 
 }  // namespace
