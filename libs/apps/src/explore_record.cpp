@@ -135,6 +135,17 @@ std::vector<std::vector<Coverage>> readCoverage(const fs::path& file,
     return all;
 }
 
+/// Before anything is cut.
+void checkHeader(const fs::path& steps) {
+    std::ifstream in(steps);
+    std::string header;
+    if (std::getline(in, header) && !header.ends_with(",seconds") &&
+        header.find(",seconds,") == std::string::npos) {
+        throw FileError(steps.string() +
+                        ":1: no column 'seconds': recorded by another version; nothing is changed");
+    }
+}
+
 }  // namespace
 
 void checkSameConfiguration(const RunDirectory& directory, const std::string& config) {
@@ -169,21 +180,6 @@ std::optional<std::string> howItEnded(const RunDirectory& directory, const std::
     const bool limit = reason.starts_with("max_");
     return reason == "interrupted" || (limit && !sameLimits) ? std::nullopt : std::optional(reason);
 }
-
-namespace {
-
-/// Before anything is cut.
-void checkHeader(const fs::path& steps) {
-    std::ifstream in(steps);
-    std::string header;
-    if (std::getline(in, header) && !header.ends_with(",seconds") &&
-        header.find(",seconds,") == std::string::npos) {
-        throw FileError(steps.string() +
-                        ":1: no column 'seconds': recorded by another version; nothing is changed");
-    }
-}
-
-}  // namespace
 
 ExploreRecord salvageRecord(const RunDirectory& directory, bool rawlog,
                             const std::vector<double>& deltas) {

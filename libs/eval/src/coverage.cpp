@@ -5,9 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <stdexcept>
 
+#include "riftmap/core/union_find.h"
 #include "riftmap/eval/point_index.h"
 
 namespace riftmap {
@@ -48,29 +48,6 @@ double quantile(std::vector<float>& values, double q) {
     std::nth_element(values.begin(), values.begin() + at, values.end());
     return static_cast<double>(values[static_cast<std::size_t>(at)]);
 }
-
-/// Union-find over consecutive numbers.
-class Groups {
- public:
-    explicit Groups(std::size_t count) : parent_(count) {
-        std::iota(parent_.begin(), parent_.end(), std::uint32_t{0});
-    }
-    std::uint32_t root(std::uint32_t i) {
-        while (parent_[i] != i) {
-            parent_[i] = parent_[parent_[i]];
-            i = parent_[i];
-        }
-        return i;
-    }
-    void join(std::uint32_t a, std::uint32_t b) {
-        a = root(a);
-        b = root(b);
-        parent_[std::max(a, b)] = std::min(a, b);
-    }
-
- private:
-    std::vector<std::uint32_t> parent_;
-};
 
 }  // namespace
 
@@ -272,11 +249,11 @@ double CoverageJudge::explainedShare(const std::vector<float>& sampleDistances, 
     const auto radius = static_cast<float>(reach);
     const PointIndex index(open, radius);
     const PointIndex rims(rifts, radius);
-    Groups groups(open.size());
+    UnionFind groups(open.size());
     for (std::uint32_t i = 0; i < open.size(); ++i) {
         index.anyWithin(open[i], radius, [&](std::uint32_t other, float) {
             if (other < i) {
-                groups.join(i, other);
+                groups.unite(i, other);
             }
             return false;
         });
