@@ -21,7 +21,8 @@ namespace {
 #ifdef __SANITIZE_THREAD__
 /// The thread sanitizer cannot see how oneTBB, which is not instrumented, orders its tasks: every
 /// loop would be reported. Threads that it does see let it watch what our bodies do to each other.
-void runRanges(std::size_t ranges, const std::function<void(std::size_t)>& run) {
+template <class Run>
+void runRanges(std::size_t ranges, const Run& run) {
     constexpr std::size_t kThreads = 4;
     std::atomic<std::size_t> next{0};
     std::exception_ptr error;
@@ -49,7 +50,8 @@ void runRanges(std::size_t ranges, const std::function<void(std::size_t)>& run) 
     }
 }
 #else
-void runRanges(std::size_t ranges, const std::function<void(std::size_t)>& run) {
+template <class Run>
+void runRanges(std::size_t ranges, const Run& run) {
     tbb::parallel_for(
         tbb::blocked_range<std::size_t>(0, ranges, 1),
         [&](const tbb::blocked_range<std::size_t>& some) {

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "riftmap/eval/coverage.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
+#include "riftmap/core/parallel.h"
 #include "riftmap/core/union_find.h"
 #include "riftmap/eval/point_index.h"
 
@@ -92,7 +91,7 @@ std::vector<float> CoverageJudge::sampleDistances(std::span<const Eigen::Vector3
     const auto reach = coverageLimit(std::max(deltas_.back(), headline_));
     const PointIndex index(vertices, reach, bounds_);
     std::vector<float> out(samples_.points.size());
-    tbb::parallel_for(std::size_t{0}, out.size(), [&](std::size_t i) {
+    parallelForEach(out.size(), 64, [&](std::size_t i) {
         const auto near = index.nearest(samples_.points[i], reach);
         out[i] = near ? std::sqrt(near->squaredDistance) : kInfinity;
     });
@@ -118,7 +117,7 @@ std::vector<Coverage> CoverageJudge::coverage(std::span<const Eigen::Vector3f> v
 
 std::vector<float> CoverageJudge::vertexErrors(std::span<const Eigen::Vector3f> vertices) const {
     std::vector<float> out(vertices.size(), kInfinity);
-    tbb::parallel_for(std::size_t{0}, vertices.size(), [&](std::size_t i) {
+    parallelForEach(vertices.size(), 64, [&](std::size_t i) {
         if (!vertices[i].allFinite()) {
             return;
         }
@@ -139,7 +138,7 @@ std::vector<std::uint8_t> CoverageJudge::strictlyCovered(std::span<const Eigen::
     const auto reach = coverageLimit(delta);
     const PointIndex index(vertices, reach, bounds_);
     std::vector<std::uint8_t> out(samples_.points.size());
-    tbb::parallel_for(std::size_t{0}, out.size(), [&](std::size_t i) {
+    parallelForEach(out.size(), 64, [&](std::size_t i) {
         const Eigen::Vector3f& p = samples_.points[i];
         const Eigen::Vector3f& n = observable_.normals[i];
         out[i] = index.anyWithin(p, reach, [&](std::uint32_t v, float) {

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "riftmap/eval/coverage_tracker.h"
 
-#include <tbb/parallel_for.h>
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numeric>
+
+#include "riftmap/core/parallel.h"
 
 namespace riftmap {
 
@@ -154,7 +154,7 @@ std::vector<Coverage> CoverageTracker::update(std::span<const Eigen::Vector3f> v
     }
     const PointIndex index(points, limits_.back() / 2);
     std::vector<std::uint8_t> levels(level_);
-    tbb::parallel_for(std::size_t{0}, places.size(), [&](std::size_t k) {
+    parallelForEach(places.size(), 64, [&](std::size_t k) {
         for (std::uint32_t i = start_[places[k]]; i < start_[places[k] + 1]; ++i) {
             levels[order_[i]] = look(order_[i], vertices, index, ids);
         }

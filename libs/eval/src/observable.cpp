@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "riftmap/eval/observable.h"
 
-#include <tbb/parallel_for.h>
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
@@ -12,6 +10,7 @@
 
 #include "hash.h"
 #include "observable_cache.h"
+#include "riftmap/core/parallel.h"
 #include "riftmap/eval/point_index.h"
 
 namespace riftmap {
@@ -240,7 +239,7 @@ class Spreading {
         }
         for (bool changed = true; changed;) {
             std::vector<Sight> next = sights;
-            tbb::parallel_for(std::size_t{0}, sights.size(), [&](std::size_t i) {
+            parallelForEach(sights.size(), 64, [&](std::size_t i) {
                 if (sights[i].side == 0) {
                     next[i] = fromNeighbours(i, sights, fresh);
                 }
@@ -337,7 +336,7 @@ ObservableSet observableSet(const RayCaster& caster, const ViewSpace& space,
         for (const Round& round : roundsOf(options.directions, spacingOf(samples))) {
             const std::vector<Sight> before = sights;
             const std::vector<Eigen::Vector2d> circle = SightFinder::goldenCircle(round.directions);
-            tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
+            parallelForEach(count, 64, [&](std::size_t i) {
                 if (before[i].side == 0 &&
                     (!round.onlyBesideSeen || spreading.besideSeen(i, before))) {
                     sights[i] = finder.lookOut(i, circle);

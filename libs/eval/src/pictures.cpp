@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "riftmap/eval/pictures.h"
 
-#include <tbb/parallel_for.h>
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -11,6 +9,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "riftmap/core/file.h"
+#include "riftmap/core/parallel.h"
 
 namespace riftmap {
 
@@ -187,7 +186,7 @@ cv::Mat CoveragePictures::paint(const Eye& eye, int width, int height, cv::Mat* 
     if (depth != nullptr) {
         *depth = cv::Mat(height, width, CV_32F, cv::Scalar(1e30F));
     }
-    tbb::parallel_for(0, height, [&](int row) {
+    parallelForEach(height, 4, [&](int row) {
         for (int column = 0; column < width; ++column) {
             const Seen seen = look(eye, column, row, width, height);
             picture.at<cv::Vec3b>(row, column) = seen.depth > 0 ? colour(seen) : kBackground;

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
@@ -7,6 +6,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "riftmap/core/parallel.h"
 #include "riftmap/eval/observable.h"
 
 namespace riftmap {
@@ -59,7 +59,7 @@ ReachableSpace::ReachableSpace(const RayCaster& caster, const ViewSpace& space, 
                        static_cast<std::size_t>(size_.z());
     distance_.resize(count);
     const double cap = space_.clearance + 2 * grid_;
-    tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
+    parallelForEach(count, 64, [&](std::size_t i) {
         const auto wall = caster_->closest(position(i), cap);
         distance_[i] = static_cast<float>(wall ? wall->distance : cap);
     });
@@ -123,7 +123,7 @@ bool ReachableSpace::anyNodeAround(const Eigen::Vector3d& place, F&& f) const {
 
 void ReachableSpace::markNeighbours() {
     beside_ = reachable_;
-    tbb::parallel_for(std::size_t{0}, beside_.size(), [&](std::size_t i) {
+    parallelForEach(beside_.size(), 64, [&](std::size_t i) {
         beside_[i] = anyNodeAround(position(i), [&](std::size_t n) { return reachable_[n] != 0; });
     });
 }

@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "riftmap/planner/free_space.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -11,6 +8,8 @@
 #include <stdexcept>
 #include <string>
 #include <utility>
+
+#include "riftmap/core/parallel.h"
 
 namespace riftmap {
 
@@ -225,57 +224,53 @@ void FreeSpace::carve(const View& view, const SensorModel& sensor, bool backgrou
     const int width = view.disparity.width;
     const int height = view.disparity.height;
     const ViewPyramid pyramid(camera, firstColumn, sensor.farLimit);
-    tbb::parallel_for(
-        tbb::blocked_range<int>(0, size_.z()), [&](const tbb::blocked_range<int>& zs) {
-            for (int z = zs.begin(); z < zs.end(); ++z) {
-                for (int y = 0; y < size_.y(); ++y) {
-                    const Eigen::Vector3d first = camera_T_world * centre({0, y, z});
-                    const Eigen::Vector3d step = camera_T_world.rotation.col(0) * voxel_;
-                    const auto [begin, end] = pyramid.clip(first, step, size_.x());
-                    Eigen::Vector3d p = first + begin * step;
-                    std::size_t i = index({begin, y, z});
-                    for (int x = begin; x < end; ++x, ++i, p += step) {
-                        if (p.z() < radius || p.z() > sensor.farLimit ||
-                            (voxels_[i] & kFreeBit) != 0) {
-                            continue;
-                        }
-                        const Eigen::Vector2d uv = camera.project(p);
-                        const double px = camera.fx * radius / p.z();
-                        const int c0 = static_cast<int>(std::floor(uv.x() - px));
-                        const int c1 = static_cast<int>(std::ceil(uv.x() + px));
-                        const int r0 = static_cast<int>(std::floor(uv.y() - px));
-                        const int r1 = static_cast<int>(std::ceil(uv.y() + px));
-                        const int c = static_cast<int>(std::lround(uv.x()));
-                        const int r = static_cast<int>(std::lround(uv.y()));
-                        if (c < firstColumn || r < 0 || c >= width || r >= height) {
-                            continue;
-                        }
-                        // A voxel that the surface cuts is never free as a whole, and need not hold
-                        // a vertex: it is known nevertheless.
-                        const float at = depth.least(c, r, c, r);
-                        const bool measured = view.disparity.valid(c, r);
-                        if ((measured || backgroundIsFree) &&
-                            p.z() < static_cast<double>(at) + 0.5 * voxel_) {
-                            voxels_[i] |= kKnownBit;
-                            if (p.z() < static_cast<double>(at)) {
-                                voxels_[i] |= kSeenBit;
-                            }
-                        }
-                        // Near the camera few voxels are in the image as a whole. Of one whose
-                        // middle is, what sticks out borders on a voxel that is not free, and keeps
-                        // the distance that is kept to that one.
-                        const int a = std::max(c0, firstColumn);
-                        const int b = std::max(r0, 0);
-                        const int e = std::min(c1, width - 1);
-                        const int f = std::min(r1, height - 1);
-                        if (depth.measuredShare(a, b, e, f) >= kMeasured &&
-                            static_cast<double>(depth.least(a, b, e, f)) > p.z() + radius) {
-                            voxels_[i] |= kFreeBit;
-                        }
+    parallelForEach(size_.z(), 1, [&](int z) {
+        for (int y = 0; y < size_.y(); ++y) {
+            const Eigen::Vector3d first = camera_T_world * centre({0, y, z});
+            const Eigen::Vector3d step = camera_T_world.rotation.col(0) * voxel_;
+            const auto [begin, end] = pyramid.clip(first, step, size_.x());
+            Eigen::Vector3d p = first + begin * step;
+            std::size_t i = index({begin, y, z});
+            for (int x = begin; x < end; ++x, ++i, p += step) {
+                if (p.z() < radius || p.z() > sensor.farLimit || (voxels_[i] & kFreeBit) != 0) {
+                    continue;
+                }
+                const Eigen::Vector2d uv = camera.project(p);
+                const double px = camera.fx * radius / p.z();
+                const int c0 = static_cast<int>(std::floor(uv.x() - px));
+                const int c1 = static_cast<int>(std::ceil(uv.x() + px));
+                const int r0 = static_cast<int>(std::floor(uv.y() - px));
+                const int r1 = static_cast<int>(std::ceil(uv.y() + px));
+                const int c = static_cast<int>(std::lround(uv.x()));
+                const int r = static_cast<int>(std::lround(uv.y()));
+                if (c < firstColumn || r < 0 || c >= width || r >= height) {
+                    continue;
+                }
+                // A voxel that the surface cuts is never free as a whole, and need not hold
+                // a vertex: it is known nevertheless.
+                const float at = depth.least(c, r, c, r);
+                const bool measured = view.disparity.valid(c, r);
+                if ((measured || backgroundIsFree) &&
+                    p.z() < static_cast<double>(at) + 0.5 * voxel_) {
+                    voxels_[i] |= kKnownBit;
+                    if (p.z() < static_cast<double>(at)) {
+                        voxels_[i] |= kSeenBit;
                     }
                 }
+                // Near the camera few voxels are in the image as a whole. Of one whose
+                // middle is, what sticks out borders on a voxel that is not free, and keeps
+                // the distance that is kept to that one.
+                const int a = std::max(c0, firstColumn);
+                const int b = std::max(r0, 0);
+                const int e = std::min(c1, width - 1);
+                const int f = std::min(r1, height - 1);
+                if (depth.measuredShare(a, b, e, f) >= kMeasured &&
+                    static_cast<double>(depth.least(a, b, e, f)) > p.z() + radius) {
+                    voxels_[i] |= kFreeBit;
+                }
             }
-        });
+        }
+    });
 }
 
 void FreeSpace::setSurface(const std::vector<Eigen::Vector3d>& points) {

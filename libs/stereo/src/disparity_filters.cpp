@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "riftmap/stereo/disparity_filters.h"
 
-#include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
@@ -9,6 +8,7 @@
 #include <cmath>
 
 #include "filter_kernel.h"
+#include "riftmap/core/parallel.h"
 
 namespace riftmap {
 
@@ -118,7 +118,7 @@ void IsolatedFilter::apply(DisparityImage& image, int minSize, float maxDifferen
     const int strips = std::clamp(tbb::this_task_arena::max_concurrency(), 1, image.height);
     strips_.resize(std::max(strips_.size(), static_cast<std::size_t>(strips)));
     const auto strip = [&](int i) -> Strip& { return strips_[static_cast<std::size_t>(i)]; };
-    tbb::parallel_for(0, strips, [&](int i) {
+    parallelForEach(strips, 1, [&](int i) {
         label(image, i * image.height / strips, (i + 1) * image.height / strips, maxDifference,
               strip(i));
     });
@@ -126,7 +126,7 @@ void IsolatedFilter::apply(DisparityImage& image, int minSize, float maxDifferen
         joinRows(image, strip(i - 1).lastRow, strip(i - 1).end, strip(i).begin, strip(i).secondRow,
                  maxDifference);
     }
-    tbb::parallel_for(0, strips, [&](int i) { discardSmall(strip(i), minSize, image); });
+    parallelForEach(strips, 1, [&](int i) { discardSmall(strip(i), minSize, image); });
 }
 
 void discardSilhouettes(DisparityImage& image, int reach, int rows, float step,
@@ -137,11 +137,11 @@ void discardSilhouettes(DisparityImage& image, int reach, int rows, float step,
     const auto width = static_cast<std::size_t>(image.width);
     // Least disparity of the columns within reach, row by row; infinity never wins.
     scratch.resize(image.disparity.size());
-    tbb::parallel_for(0, image.height, [&](int row) {
+    parallelForEach(image.height, 16, [&](int row) {
         kernel::leastAlong(image.disparity.data() + image.index(0, row), width,
                            static_cast<std::size_t>(reach), scratch.data() + image.index(0, row));
     });
-    tbb::parallel_for(0, image.height, [&](int row) {
+    parallelForEach(image.height, 16, [&](int row) {
         const int first = std::max(0, row - rows);
         const int last = std::min(image.height - 1, row + rows);
         std::array<const float*, 2 * kMaxSilhouetteRows + 1> least{};
@@ -159,7 +159,7 @@ void growSigmaWithSlope(DisparityImage& image, float slope) {
         return;
     }
     constexpr int kReach = static_cast<int>(kernel::kSlopeReach);
-    tbb::parallel_for(0, image.height, [&](int row) {
+    parallelForEach(image.height, 16, [&](int row) {
         const auto rowOf = [&](int r) { return image.disparity.data() + image.index(0, r); };
         const float* d = rowOf(row);
         const float* up = row >= kReach ? rowOf(row - kReach) : d;

@@ -2,8 +2,6 @@
 #include "riftmap/stereo/paper_matcher.h"
 
 #include <hwy/aligned_allocator.h>
-#include <tbb/parallel_for.h>
-#include <tbb/parallel_invoke.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
@@ -15,6 +13,7 @@
 #include <vector>
 
 #include "match_kernel.h"
+#include "riftmap/core/parallel.h"
 #include "riftmap/stereo/disparity_filters.h"
 #include "riftmap/stereo/grey.h"
 #include "riftmap/stereo/image_noise.h"
@@ -176,7 +175,7 @@ void Level::match(const StereoOptions& options, const cv::Mat& left, const cv::M
     };
     const auto inStrips = [&](auto&& work) {
         std::atomic<int> next{0};
-        tbb::parallel_for(0, threads, [&](int thread) {
+        parallelForEach(threads, 1, [&](int thread) {
             auto* scratch = scratch_[static_cast<std::size_t>(thread)].get(scratchSize);
             for (int i = next++; i < strips; i = next++) {
                 work(startOf(i), startOf(i + 1), scratch);
@@ -313,9 +312,13 @@ void PaperMatcher::compute(const cv::Mat& left, const cv::Mat& right, DisparityI
     out.firstColumn = std::clamp(maxDisparity, 0, b.grey.left.cols);
     const double noise =
         options_.imageNoise > 0 ? options_.imageNoise : b.noise.measure(b.grey.left);
-    tbb::parallel_invoke(
-        [&] { b.level.match(options_, b.grey.left, b.grey.right, noise, out.firstColumn, out); },
-        [&] { b.guard.search(options_, b.grey); });
+    parallelForEach(2, 1, [&](int half) {
+        if (half == 0) {
+            b.level.match(options_, b.grey.left, b.grey.right, noise, out.firstColumn, out);
+        } else {
+            b.guard.search(options_, b.grey);
+        }
+    });
     b.guard.discard(out);
     b.isolated.apply(out, options_.isolatedSize, static_cast<float>(options_.isolatedDifference));
     b.rim.apply(b.grey.left, options_.rimTexture, out);

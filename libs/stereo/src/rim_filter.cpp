@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
 
+#include "riftmap/core/parallel.h"
 #include "riftmap/stereo/disparity_filters.h"
 
 namespace riftmap {
@@ -19,7 +19,7 @@ void RimFilter::measureTexture(const cv::Mat& grey, int texture) {
     const int width = grey.cols;
     flat_.resize(grey.total());
     sum_.resize(grey.total());
-    tbb::parallel_for(0, grey.rows, [&](int row) {
+    parallelForEach(grey.rows, 16, [&](int row) {
         const std::uint8_t* rows[] = {grey.ptr(std::max(0, row - 1)), grey.ptr(row),
                                       grey.ptr(std::min(grey.rows - 1, row + 1))};
         const auto start = static_cast<std::size_t>(row) * static_cast<std::size_t>(width);
@@ -46,7 +46,7 @@ void RimFilter::measureTexture(const cv::Mat& grey, int texture) {
 
 void RimFilter::markBare(const DisparityImage& image) {
     bare_.resize(image.disparity.size());
-    tbb::parallel_for(0, image.height, [&](int row) {
+    parallelForEach(image.height, 16, [&](int row) {
         std::uint8_t* bare = bare_.data() + image.index(0, row);
         const float* d = image.disparity.data() + image.index(0, row);
         for (int c = 0; c < image.width; ++c) {
@@ -69,7 +69,7 @@ void RimFilter::apply(const cv::Mat& grey, int texture, DisparityImage& image) {
         }
     };
     beside_.resize(bare_.size());
-    tbb::parallel_for(0, image.height, [&](int row) {
+    parallelForEach(image.height, 16, [&](int row) {
         const std::uint8_t* bare = bare_.data() + image.index(0, row);
         std::uint8_t* beside = beside_.data() + image.index(0, row);
         std::copy(bare, bare + width, beside);
@@ -80,7 +80,7 @@ void RimFilter::apply(const cv::Mat& grey, int texture, DisparityImage& image) {
             }
         }
     });
-    tbb::parallel_for(0, image.height, [&](int row) {
+    parallelForEach(image.height, 16, [&](int row) {
         float* d = image.disparity.data() + image.index(0, row);
         const std::uint8_t* flat = flat_.data() + image.index(0, row);
         forRowsNear(row, kHoleReach, [&](std::size_t other) {
@@ -91,7 +91,7 @@ void RimFilter::apply(const cv::Mat& grey, int texture, DisparityImage& image) {
         });
     });
     markBare(image);
-    tbb::parallel_for(0, image.height, [&](int row) {
+    parallelForEach(image.height, 16, [&](int row) {
         float* d = image.disparity.data() + image.index(0, row);
         const std::uint8_t* here = grey.ptr(row);
         forRowsNear(row, kSimilarReach, [&](std::size_t other) {

@@ -15,6 +15,19 @@ namespace riftmap {
 void parallelFor(std::size_t n, std::size_t grain,
                  const std::function<void(std::size_t begin, std::size_t end)>& body);
 
+/// Calls body(i) for every i of [0, n) in the same way; `grain`: so many one after the other. Takes
+/// no memory of its own.
+template <class Index, class Body>
+void parallelForEach(Index n, std::size_t grain, const Body& body) {
+    static_assert(std::is_integral_v<Index>);
+    const auto run = [&body](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+            body(static_cast<Index>(i));
+        }
+    };
+    parallelFor(n > 0 ? static_cast<std::size_t>(n) : 0, grain, run);
+}
+
 /// combine(...combine(combine(initial, map(0, grain)), map(grain, 2 grain))..., map(..., n)): the
 /// maps run at once, the combining in this order, so that sums of floats come out the same for any
 /// number of threads.
