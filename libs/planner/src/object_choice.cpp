@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The choice of views around an object that stands alone: a tour over views that complement each
 // other.
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "riftmap/core/parallel.h"
 #include "view_choice.h"
 
 namespace riftmap {
@@ -104,7 +104,8 @@ ViewScore Choice::scoreAround(const Pose& pose) const {
             score.unknownGain += gain;
             continue;
         }
-        score.openGain += ViewScorer::isTear(s.item) ? gain : 0.0;
+        score.openGain += gain;
+        score.coarseGain += ViewScorer::isTear(s.item) ? 0.0 : gain;
         // Well enough to count as a try, however little is left of its worth.
         const RiftRecord& record = *scorer_.open()[*cell];
         if (static_cast<double>(s.share) > 0.25 * scorer_.leftAfterTries(record)) {
@@ -133,10 +134,15 @@ std::vector<Eigen::Vector3d> Choice::frontierSeen(const Pose& pose) const {
 std::optional<ViewPlan> Choice::makeAround(const Eigen::AlignedBox3d& box) {
     addPlacesAround(box);
     addPool();
-    scorer_.setFrontier(k_.unseen().frontier(box), k_.unseen().voxelSize());
+    std::vector<FreeSpace::Frontier> frontier = k_.unseen().frontier(box);
+    for (FreeSpace::Frontier& f : frontier) {
+        f.area *= static_cast<float>(
+            memory_.lookedInVain.left(f.centre.cast<double>(), k_.unseen().voxelSize()));
+    }
+    scorer_.setFrontier(std::move(frontier), k_.unseen().voxelSize());
     worth_ = scorer_.worth();
     std::vector<TourView> views(candidates_.size());
-    tbb::parallel_for(std::size_t{0}, candidates_.size(), [&](std::size_t i) {
+    parallelForEach(candidates_.size(), 4, [&](std::size_t i) {
         ViewScorer::Seen seen = scorer_.sights(candidates_[i].pose);
         candidates_[i].score.nearShare = seen.nearShare;
         views[i].fromStart = candidates_[i].path;
@@ -148,6 +154,7 @@ std::optional<ViewPlan> Choice::makeAround(const Eigen::AlignedBox3d& box) {
     TourOptions options;
     options.viewCost = k_.options().viewCost;
     options.minGain = minGain();
+    options.settled = 0.3 * k_.summary().area();
     const ViewTour tour = planTour(
         views, worth_,
         [&](std::size_t a, std::size_t b) {

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
+#include <set>
 #include <unordered_map>
 
+#include "riftmap/core/parallel.h"
 #include "view_choice.h"
 
 namespace riftmap {
@@ -28,6 +28,7 @@ ViewScorer::Weights weightsFor(const Knowledge& k, const ObjectMemory& memory) {
         weights.coarse = 0.15;
         weights.unknown *= memory.frontier.share();
         weights.hidden = 0.65 * memory.tears.share();
+        weights.doubt = memory.doubt.share();
         weights.vain = weights.vainUnmatched = 0.4;
     }
     return weights;
@@ -210,14 +211,10 @@ void Choice::rate(Candidate& c, const ViewScore& score) const {
 }
 
 void Choice::scoreFrom(std::size_t first) {
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(first, candidates_.size(), 4),
-                      [&](const tbb::blocked_range<std::size_t>& range) {
-                          for (std::size_t i = range.begin(); i < range.end(); ++i) {
-                              const Pose& pose = candidates_[i].pose;
-                              rate(candidates_[i],
-                                   k_.surfaceBox() ? scoreAround(pose) : scorer_.score(pose));
-                          }
-                      });
+    parallelForEach(candidates_.size() - first, 4, [&](std::size_t i) {
+        Candidate& c = candidates_[first + i];
+        rate(c, k_.surfaceBox() ? scoreAround(c.pose) : scorer_.score(c.pose));
+    });
 }
 
 /// Where there are more open cells than can be weighed for every candidate, those that an estimate
@@ -227,12 +224,9 @@ void Choice::preselect() {
     if (!scorer_.samples() || candidates_.size() <= kLeft) {
         return;
     }
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, candidates_.size(), 4),
-                      [&](const tbb::blocked_range<std::size_t>& range) {
-                          for (std::size_t i = range.begin(); i < range.end(); ++i) {
-                              rate(candidates_[i], scorer_.estimate(candidates_[i].pose));
-                          }
-                      });
+    parallelForEach(candidates_.size(), 4, [&](std::size_t i) {
+        rate(candidates_[i], scorer_.estimate(candidates_[i].pose));
+    });
     std::stable_sort(candidates_.begin(), candidates_.end(),
                      [](const Candidate& a, const Candidate& b) { return a.utility > b.utility; });
     candidates_.resize(kLeft);
@@ -252,7 +246,7 @@ std::optional<ViewPlan> Choice::planFor(const Candidate& c) const {
     ViewPlan plan;
     plan.path = c.path == 0.0 ? std::vector<Pose>{c.pose} : k_.pathTo(c.pose);
     plan.gain = c.score.gain;
-    plan.tearGain = c.score.openGain;
+    plan.tearGain = std::max(0.0, c.score.openGain - c.score.coarseGain);
     plan.coarseGain = c.score.coarseGain;
     plan.unknownGain = c.score.unknownGain;
     plan.cells = c.score.cells;
@@ -459,7 +453,7 @@ std::optional<ViewPlan> Choice::make() {
 
 void PromiseKept::note(double promised, double came, double least) {
     constexpr double kFade = 0.5;  // the last few views count
-    if (promised < 0.25 * least) {
+    if (promised <= 0 || promised < 0.25 * least) {
         return;
     }
     promised_ = kFade * promised_ + promised;
@@ -467,33 +461,64 @@ void PromiseKept::note(double promised, double came, double least) {
     share_ = std::clamp((came_ + 0.5 * least) / (promised_ + 0.5 * least), 0.05, most_);
 }
 
-/// Holds what the last view promised against the surface that it brought.
-void ObjectMemory::update(const SurfaceSummary& summary, double minGain) {
-    const double cell = summary.cellSize() * summary.cellSize();
-    const std::size_t now = summary.cellCount();
-    const double came = now > cells ? static_cast<double>(now - cells) * cell : 0.0;
-    const double promised = frontierGain + tearGain;
-    if (promised > 0) {
-        const double least = minGain * static_cast<double>(now) * cell;
-        // As they were promised, so they are taken to have come.
-        const double part = came / promised;
-        const double ofFrontier = frontierGain / frontier.share();
-        const double ofTears = tearGain / tears.share();
-        frontier.note(ofFrontier, part * frontierGain, least);
-        tears.note(ofTears, part * tearGain, least);
+std::array<int, 3> LookedInVain::cubeOf(const Eigen::Vector3d& place, double edge) {
+    constexpr double kVoxels = 8;  // of a cube, along each axis
+    const Eigen::Vector3i at = (place / (kVoxels * edge)).array().floor().cast<int>();
+    return {at.x(), at.y(), at.z()};
+}
+
+void LookedInVain::note(const std::vector<Eigen::Vector3d>& places, double kept, double edge) {
+    constexpr double kBad = 0.5;
+    constexpr double kLeast = 0.3;
+    if (kept >= kBad) {
+        return;
     }
-    cells = now;
+    std::set<std::array<int, 3>> cubes;
+    for (const Eigen::Vector3d& place : places) {
+        cubes.insert(cubeOf(place, edge));
+    }
+    for (const auto& cube : cubes) {
+        left_.try_emplace(cube, 1.0).first->second *= std::max(kLeast, kept);
+    }
+}
+
+double LookedInVain::left(const Eigen::Vector3d& place, double edge) const {
+    const auto it = left_.find(cubeOf(place, edge));
+    return it == left_.end() ? 1.0 : it->second;
+}
+
+void ObjectMemory::update(const SurfaceSummary& summary, double minGain, double edge) {
+    const double came = summary.newArea();
+    const double least = minGain * summary.area();
+    const double ofNew = frontierGain + tearGain;
+    if (ofNew > 0 && ofNew >= 0.25 * least) {
+        // As they were promised, so they are taken to have come.
+        frontier.note(frontierGain / frontier.share(), came / ofNew * frontierGain, least);
+        tears.note(tearGain / tears.share(), came / ofNew * tearGain, least);
+        if (frontierGain >= tearGain) {
+            lookedInVain.note(looked, (came + 0.5 * least) / (ofNew + 0.5 * least), edge);
+        }
+    }
+    doubt.note(doubtGain / doubt.share(), std::max(0.0, came - ofNew), least);
 }
 
 std::optional<ViewPlan> RiftPlanner::next(Knowledge& knowledge) {
     if (!knowledge.surfaceBox()) {
         return Choice(knowledge, pool_, memory_).make();
     }
-    memory_.update(knowledge.summary(), knowledge.options().minGain);
+    // A way that was too long for one step ended at another view than the one that promised.
+    const double off = (knowledge.camera().translation - memory_.target).norm();
+    if (off < knowledge.space().voxelSize()) {
+        memory_.update(knowledge.summary(), knowledge.options().minGain,
+                       knowledge.unseen().voxelSize());
+    }
     auto plan = Choice(knowledge, pool_, memory_).make();
     if (plan) {
         memory_.frontierGain = plan->unknownGain;
         memory_.tearGain = plan->tearGain;
+        memory_.doubtGain = plan->coarseGain;
+        memory_.looked = plan->unknown;
+        memory_.target = plan->path.back().translation;
     }
     return plan;
 }

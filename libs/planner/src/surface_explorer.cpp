@@ -90,8 +90,8 @@ void SurfaceExplorer::look(const std::optional<ViewPlan>& plan, double planMs) {
     const double areaBefore = summary.area();
     const double coarseBefore = summary.coarseArea();
     knowledge_.update(view);
-    step.newArea = summary.area() - areaBefore;
-    step.wellKnownArea = step.newArea - (summary.coarseArea() - coarseBefore);
+    step.newArea = summary.newArea();
+    step.wellKnownArea = summary.area() - areaBefore - (summary.coarseArea() - coarseBefore);
     if (plan) {
         knowledge_.ledger().judge(knowledge_.summary(), plan->cells, before,
                                   view.world_T_camera.translation);

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "riftmap/planner/surface_summary.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
+#include <numeric>
 #include <stdexcept>
+
+#include "riftmap/core/parallel.h"
 
 namespace riftmap {
 
@@ -36,7 +38,14 @@ struct Sums {
     std::uint32_t hides = 0;
     std::uint32_t vertices = 0, torn = 0, coarse = 0, open = 0, high = 0;
     std::uint8_t kinds = 0;
+    std::uint64_t parts = 0;
 };
+
+constexpr int kParts = 4;  ///< of a cell, along each axis
+
+std::uint64_t partBit(const Eigen::Vector3i& part) {
+    return std::uint64_t{1} << ((part.z() * kParts + part.y()) * kParts + part.x());
+}
 
 /// From the neighbours towards the vertex and on: out of the surface seen so far.
 Eigen::Vector3d outwardAt(const PixelGraph& graph, VertexId id, const Vertex& v, Sums& sums) {
@@ -81,6 +90,7 @@ SurfaceCell toCell(const Sums& s, std::uint64_t key, double cell) {
     c.open = s.open;
     c.highEdges = s.high;
     c.kinds = s.kinds;
+    c.parts = s.parts;
     c.position = (s.position / s.vertices).cast<float>();
     if (s.normal.norm() > 1e-6) {
         c.normal = s.normal.normalized().cast<float>();
@@ -166,28 +176,45 @@ const SurfaceCell* SurfaceSummary::find(std::uint64_t key) const {
     return c != cells.end() && c->key == key ? &*c : nullptr;
 }
 
-void SurfaceSummary::update(const PixelGraph& graph, const View& view, const SeenThrough* seen) {
+/// Keys of the blocks that lie within the resolution of a point of the view, of every second along
+/// rows and columns: rounding and fusion may have put its vertex into the next block. In no order,
+/// some more than once.
+std::vector<std::uint64_t> SurfaceSummary::blocksSeen(const View& view) const {
     const double side = kCellsPerSide * cell_;
-    const auto blockAt = [&](const Eigen::Vector3d& p) {
-        return pack((p / side).array().floor().cast<int>());
-    };
-    changed_.clear();
+    std::vector<std::uint64_t> keys;
+    Eigen::Vector3i lastLow = Eigen::Vector3i::Constant(kOffset);
+    Eigen::Vector3i lastHigh = lastLow;
     const DisparityImage& d = view.disparity;
-    std::uint64_t last = ~std::uint64_t{0};
     for (int row = 0; row < d.height; row += 2) {
         for (int column = 0; column < d.width; column += 2) {
-            if (d.valid(column, row)) {
-                const Eigen::Vector3d p =
-                    view.world_T_camera *
-                    view.camera.backProject(column, row, static_cast<double>(d.at(column, row)));
-                const std::uint64_t key = blockAt(p);
-                if (key != last) {
-                    changed_.push_back(key);
-                    last = key;
+            if (!d.valid(column, row)) {
+                continue;
+            }
+            const Eigen::Vector3d p =
+                view.world_T_camera *
+                view.camera.backProject(column, row, static_cast<double>(d.at(column, row)));
+            const Eigen::Vector3i low = ((p.array() - resolution_) / side).floor().cast<int>();
+            const Eigen::Vector3i high = ((p.array() + resolution_) / side).floor().cast<int>();
+            if (low == lastLow && high == lastHigh) {
+                continue;
+            }
+            lastLow = low;
+            lastHigh = high;
+            for (int z = low.z(); z <= high.z(); ++z) {
+                for (int y = low.y(); y <= high.y(); ++y) {
+                    for (int x = low.x(); x <= high.x(); ++x) {
+                        keys.push_back(pack({x, y, z}));
+                    }
                 }
             }
         }
     }
+    return keys;
+}
+
+void SurfaceSummary::update(const PixelGraph& graph, const View& view, const SeenThrough* seen) {
+    changed_ = blocksSeen(view);
+    const DisparityImage& d = view.disparity;
     // Blocks that the view may have seen through lose vertices without gaining any.
     const Pose camera_T_world = view.world_T_camera.inverse();
     for (const auto& [key, block] : blocks_) {
@@ -215,8 +242,12 @@ void SurfaceSummary::update(const PixelGraph& graph, const View& view, const See
     std::sort(changed_.begin(), changed_.end());
     changed_.erase(std::unique(changed_.begin(), changed_.end()), changed_.end());
     std::vector<Block> rebuilt(changed_.size());
-    tbb::parallel_for(std::size_t{0}, changed_.size(),
-                      [&](std::size_t i) { rebuilt[i] = build(graph, changed_[i], seen); });
+    parallelForEach(changed_.size(), 1,
+                    [&](std::size_t i) { rebuilt[i] = build(graph, changed_[i], seen); });
+    std::vector<std::size_t> isNew(changed_.size());
+    parallelForEach(changed_.size(), 1, [&](std::size_t i) { isNew[i] = newParts(rebuilt[i]); });
+    newArea_ = static_cast<double>(std::accumulate(isNew.begin(), isNew.end(), std::size_t{0})) *
+               std::pow(cell_ / kParts, 2) / 1.5;
     former_.assign(changed_.size(), {});
     for (std::size_t i = 0; i < changed_.size(); ++i) {
         const auto it = blocks_.find(changed_[i]);
@@ -231,6 +262,38 @@ void SurfaceSummary::update(const PixelGraph& graph, const View& view, const See
             blocks_.erase(it);
         }
     }
+}
+
+/// Parts of the block's cells that hold a vertex while neither they nor a part that shares a face
+/// with them did before.
+std::size_t SurfaceSummary::newParts(const Block& now) const {
+    const auto before = [&](const Eigen::Vector3i& cell) {
+        const SurfaceCell* c = find(pack(cell));
+        return c == nullptr ? std::uint64_t{0} : c->parts;
+    };
+    // Parts at the lower and upper faces of a cell, see partBit().
+    constexpr std::uint64_t kX0 = 0x1111111111111111, kX3 = kX0 << 3;
+    constexpr std::uint64_t kY0 = 0x000F000F000F000F, kY3 = kY0 << 12;
+    std::size_t count = 0;
+    for (const SurfaceCell& cell : now.cells) {
+        const Eigen::Vector3i at = unpack(cell.key);
+        const std::uint64_t own = before(at);
+        if ((cell.parts & ~own) == 0) {
+            continue;
+        }
+        std::uint64_t known = own;
+        known |= (own & ~kX3) << 1 | (own & ~kX0) >> 1;
+        known |= (own & ~kY3) << 4 | (own & ~kY0) >> 4;
+        known |= own << 16 | own >> 16;
+        known |= (before(at + Eigen::Vector3i::UnitX()) & kX0) << 3;
+        known |= (before(at - Eigen::Vector3i::UnitX()) & kX3) >> 3;
+        known |= (before(at + Eigen::Vector3i::UnitY()) & kY0) << 12;
+        known |= (before(at - Eigen::Vector3i::UnitY()) & kY3) >> 12;
+        known |= before(at + Eigen::Vector3i::UnitZ()) << 48;
+        known |= before(at - Eigen::Vector3i::UnitZ()) >> 48;
+        count += static_cast<std::size_t>(std::popcount(cell.parts & ~known));
+    }
+    return count;
 }
 
 SurfaceSummary::Block SurfaceSummary::build(const PixelGraph& graph, std::uint64_t blockKey,
@@ -249,6 +312,9 @@ SurfaceSummary::Block SurfaceSummary::build(const PixelGraph& graph, std::uint64
         }
         Sums& s = sums[static_cast<std::size_t>((at.z() * n + at.y()) * n + at.x())];
         ++s.vertices;
+        const Eigen::Array3d inCells = p.array() / cell_;
+        s.parts |=
+            partBit(((kParts * inCells).floor() - kParts * inCells.floor()).cast<int>().matrix());
         s.position += p;
         s.normal += v.normal.cast<double>();
         if (v.open == 0) {

@@ -311,7 +311,7 @@ std::vector<float> ViewScorer::worth() const {
     worth.reserve(2 * (open_.size() + frontier_.size()));
     for (const RiftRecord* record : open_) {
         worth.push_back(hidden * record->cell.hidden + kBesideRim * record->cell.rim);
-        worth.push_back(record->cell.doubt);
+        worth.push_back(static_cast<float>(weights_.doubt) * record->cell.doubt);
     }
     for (const FreeSpace::Frontier& f : frontier_) {
         const float area = static_cast<float>(weights_.unknown) * f.area.norm();

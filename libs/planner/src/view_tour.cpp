@@ -34,6 +34,12 @@ Insertion cheapestInsertion(const std::vector<TourView>& views, const WayLength&
     return best;
 }
 
+/// What a metre costs while `missing` of the tour's whole gain is still to be seen.
+double weightOf(double missing, double whole, const TourOptions& options) {
+    const double all = whole + options.settled;
+    return options.tail + (all > 0 ? missing / all : 0.0);
+}
+
 /// Gain of every subset of the stops; bit i of the index stands for stops[i].
 std::vector<double> gainsOfSubsets(const std::vector<TourView>& views,
                                    const std::vector<float>& worth,
@@ -61,7 +67,7 @@ std::vector<std::size_t> bestOrder(const std::vector<TourView>& views,
     const std::size_t all = (std::size_t{1} << n) - 1;
     const std::vector<double> gains = gainsOfSubsets(views, worth, stops);
     const auto weight = [&](std::size_t seen) {
-        return options.tail + (gains[all] > 0 ? 1.0 - gains[seen] / gains[all] : 0.0);
+        return weightOf(gains[all] - gains[seen], gains[all], options);
     };
     std::vector<double> way(n * n);
     for (std::size_t i = 0; i < n * n; ++i) {
@@ -136,7 +142,7 @@ double tourCost(const std::vector<TourView>& views, const std::vector<float>& wo
     double cost = 0;
     for (std::size_t i = 0; i < order.size(); ++i) {
         const double way = i == 0 ? views[order[i]].fromStart : between(order[i - 1], order[i]);
-        cost += (options.tail + (whole > 0 ? missing / whole : 0.0)) * (options.viewCost + way);
+        cost += weightOf(missing, whole, options) * (options.viewCost + way);
         missing -= seen.add(views[order[i]]);
     }
     return cost;

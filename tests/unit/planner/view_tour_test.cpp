@@ -54,7 +54,8 @@ struct Scene {
         for (std::size_t k = 0; k < order.size(); ++k) {
             const double way = k == 0 ? views[order[0]].fromStart
                                       : (places[order[k - 1]] - places[order[k]]).norm();
-            sum += (1 - seen(k) / whole + options.tail) * (options.viewCost + way);
+            sum += ((whole - seen(k)) / (whole + options.settled) + options.tail) *
+                   (options.viewCost + way);
         }
         return sum;
     }
@@ -68,6 +69,7 @@ TEST(ViewTour, CostIsTheAreaOverTheCurve) {
     const Scene scene(7, 5);
     TourOptions options;
     options.tail = 0.3;
+    options.settled = 1.7;
     const std::vector<std::size_t> order = {3, 0, 4, 1};
     EXPECT_NEAR(tourCost(scene.views, scene.worth, scene.between(), options, order),
                 scene.cost(options, order), 1e-4);
@@ -79,6 +81,7 @@ TEST(ViewTour, NoOrderIsCheaper) {
         TourOptions options;
         options.maxViews = 6;
         options.tail = seed % 3 == 0 ? 0.0 : 0.4;
+        options.settled = seed % 2 == 0 ? 0.0 : 3.0;
         const ViewTour tour = planTour(scene.views, scene.worth, scene.between(), options);
         ASSERT_EQ(tour.views.size(), 6U);
         EXPECT_NEAR(tour.cost, scene.cost(options, tour.views), 1e-4) << "seed " << seed;
@@ -166,6 +169,18 @@ TEST(ViewTour, GainsAddUpAndWhatWasSeenCountsNoMore) {
     EXPECT_NEAR(seen.add(views[1]), 1.8, 1e-5);
     EXPECT_NEAR(seen.add(views[0]), 0.2, 1e-5);
     EXPECT_NEAR(seen.add(views[0]), 0.0, 1e-6);
+}
+
+TEST(ViewTour, LargeGainsComeFirstAndRemainsOnTheShortestWay) {
+    // A view beside the camera with a little to see, one far off with much.
+    const std::vector<float> worth = {1.0F, 9.0F};
+    const std::vector<TourView> views = {{{{0, 1.0F}}, 1.0}, {{{1, 1.0F}}, 2.0}};
+    const WayLength between = [](std::size_t, std::size_t) { return 3.0; };
+    TourOptions options;
+    options.viewCost = 0.5;
+    EXPECT_EQ(planTour(views, worth, between, options).views, (std::vector<std::size_t>{1, 0}));
+    options.settled = 1000;  // the same ten square metres where a thousand are known
+    EXPECT_EQ(planTour(views, worth, between, options).views, (std::vector<std::size_t>{0, 1}));
 }
 
 TEST(ViewTour, EmptyWhereNothingIsWorthAView) {

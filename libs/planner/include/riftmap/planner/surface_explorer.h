@@ -34,7 +34,7 @@ struct ExploreStep {
     double gain = 0;            ///< that the plan expected [m^2] ...
     double coarseGain = 0;      ///< ... of it by knowing surface better
     double unknownGain = 0;     ///< ... of it by looking into unknown space
-    double newArea = 0;         ///< that came true: surface in cells that held none [m^2]
+    double newArea = 0;         ///< that came true, see SurfaceSummary::newArea() [m^2]
     double wellKnownArea = 0;   ///< surface that is as fine and accurate as asked since [m^2]
     double pathLength = 0;      ///< so far [m]
     double grabMs = 0, stereoMs = 0, mergeMs = 0, riftsMs = 0;

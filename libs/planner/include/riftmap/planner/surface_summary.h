@@ -38,6 +38,8 @@ struct SurfaceCell {
     float hidden = 0;
     Eigen::Vector3f hiddenPosition = Eigen::Vector3f::Zero();  ///< mean of where it begins
     float doubt = 0;  ///< part of it that is probably farther from the map than was asked [m^2]
+    /// Which of the 4 x 4 x 4 parts of the cube hold a vertex: bit (z * 4 + y) * 4 + x.
+    std::uint64_t parts = 0;
 };
 
 /// The map as the planner looks at it: a few thousand cells instead of millions of vertices, kept
@@ -62,7 +64,8 @@ class SurfaceSummary {
     };
     /// All blocks by key, in ascending order.
     const std::map<std::uint64_t, Block>& blocks() const { return blocks_; }
-    /// Keys of the blocks that the last update worked on, ascending.
+    /// Keys of the blocks that the last update worked on, ascending; some may hold no cell, before
+    /// and after.
     const std::vector<std::uint64_t>& changed() const { return changed_; }
     /// The same blocks as they were before it; empty ones for those that are new.
     const std::vector<Block>& former() const { return former_; }
@@ -77,8 +80,13 @@ class SurfaceSummary {
     /// Added to a cell's key: the keys of 13 of the 26 cells around it, those that are larger.
     static std::array<std::uint64_t, 13> neighbourOffsets();
     std::size_t cellCount() const { return cellCount_; }
-    /// Area of a sheet through each cell, all together [m^2].
+    /// Area of a face of each cell, all together: about 1.5 times the surface's [m^2].
     double area() const { return static_cast<double>(cellCount_) * cell_ * cell_; }
+    /// Area that the last update found where there was none [m^2]: in parts of cells (a quarter of
+    /// their edge, the target resolution by default) that hold a vertex while neither they nor one
+    /// that shares a face with them did before. A sheet crosses 1.5 parts for each of their faces'
+    /// area on average over its directions, which is taken into account, unlike in area().
+    double newArea() const { return newArea_; }
     /// Area of the cells that is sampled too sparsely or known too badly, all together [m^2].
     double coarseArea() const { return coarseArea_; }
 
@@ -86,6 +94,8 @@ class SurfaceSummary {
     static constexpr int kCellsPerSide = 8;
 
     Block build(const PixelGraph& graph, std::uint64_t blockKey, const SeenThrough* seen) const;
+    std::vector<std::uint64_t> blocksSeen(const View& view) const;
+    std::size_t newParts(const Block& now) const;
 
     double cell_, resolution_;
     std::map<std::uint64_t, Block> blocks_;
@@ -93,6 +103,7 @@ class SurfaceSummary {
     std::vector<Block> former_;
     std::size_t cellCount_ = 0;
     double coarseArea_ = 0;
+    double newArea_ = 0;
 };
 
 }  // namespace riftmap

@@ -39,6 +39,7 @@ class ViewScorer {
         double farthestReach = 4.0;  ///< ... and beyond deep steps at most
         double coarse = 0.35;        ///< of surface known better against surface known at all
         double hidden = 0.65;  ///< of what tears of an object may hide: the part that is there
+        double doubt = 1.0;    ///< of area of an object that is probably out of place, 0 to 1
         double vain = 0.8;  ///< what is left of the worth of a tear after a view that did not help
         /// The same where pixels beside it had no disparity: what did not match once will hardly
         /// match from elsewhere, while what was hidden may be seen from another side.

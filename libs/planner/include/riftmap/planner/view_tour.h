@@ -24,9 +24,12 @@ struct TourOptions {
     double viewCost = 1.0;      ///< of a view, as length of path [m], > 0
     double minGain = 0.0;       ///< a view that adds no more than this is left out
     std::size_t maxViews = 10;  ///< stops at most; the order is exact: 2^n n^2 steps, n <= 16
-    /// What a metre (or a view) costs once nothing is left to see, against what it costs while
-    /// everything is: 0 = early gain alone counts, large = the length alone.
-    double tail = 0.1;
+    /// Cost of a metre (or a view) once nothing is left to see, >= 0; while there is, the share
+    /// R(k) of tourCost() is added. 0 = early gain alone counts, large = the length alone.
+    double tail = 0.2;
+    /// What there is to see counts against this and itself [m^2], >= 0: once little is left the
+    /// order goes by the length of the way.
+    double settled = 0;
 };
 
 /// Views in the order in which they are to be taken.
@@ -56,8 +59,8 @@ class SeenItems {
 using WayLength = std::function<double(std::size_t, std::size_t)>;
 
 /// Cost of taking these views in this order: every stretch of path and every view is paid in
-/// proportion to what was still to be seen before it, plus `tail`. With R(k) the share of the
-/// tour's whole gain that is missing before stop k and l(k) the way to it,
+/// proportion to what was still to be seen before it, plus `tail`. With R(k) = the gain that is
+/// missing before stop k over (the tour's whole gain + settled), and l(k) the way to it,
 /// sum over k of (R(k) + tail) * (viewCost + l(k)): the area over the curve of what was seen.
 double tourCost(const std::vector<TourView>& views, const std::vector<float>& worth,
                 const WayLength& between, const TourOptions& options,

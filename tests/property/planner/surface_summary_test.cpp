@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "riftmap/planner/surface_summary.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <set>
+
+#include "random_scene.h"
+
+namespace riftmap {
+namespace {
+
+constexpr double kCell = 0.08;
+constexpr double kPart = kCell / 4;
+
+using Parts = std::set<std::array<int, 3>>;
+
+/// All parts of cells that hold a vertex, counted along the axes.
+Parts partsOf(const SurfaceSummary& summary) {
+    Parts parts;
+    for (const auto& [key, block] : summary.blocks()) {
+        for (const SurfaceCell& cell : block.cells) {
+            const Eigen::Vector3i at = 4 * SurfaceSummary::indexOf(cell.key);
+            for (int bit = 0; bit < 64; ++bit) {
+                if ((cell.parts >> bit & 1U) != 0) {
+                    parts.insert({at.x() + bit % 4, at.y() + bit / 4 % 4, at.z() + bit / 16});
+                }
+            }
+        }
+    }
+    return parts;
+}
+
+/// The same from the vertices themselves, in the blocks that were summed up.
+Parts partsOf(const PixelGraph& graph, const SurfaceSummary& summary) {
+    Parts parts;
+    graph.forEachVertexIn(
+        Eigen::Vector3f::Constant(-100), Eigen::Vector3f::Constant(100), [&](VertexId id) {
+            const Eigen::Vector3d p = graph.position(id).cast<double>();
+            const std::uint64_t block = SurfaceSummary::blockOf(summary.keyOf(p));
+            const Eigen::Array3i at = (4 * (p.array() / kCell)).floor().cast<int>();
+            if (std::binary_search(summary.changed().begin(), summary.changed().end(), block)) {
+                parts.insert({at.x(), at.y(), at.z()});
+            }
+        });
+    return parts;
+}
+
+std::size_t newIn(const Parts& now, const Parts& before) {
+    std::size_t count = 0;
+    for (const auto& p : now) {
+        bool known = before.count(p) > 0;
+        for (int axis = 0; axis < 3; ++axis) {
+            for (const int side : {-1, 1}) {
+                auto q = p;
+                q[static_cast<std::size_t>(axis)] += side;
+                known = known || before.count(q) > 0;
+            }
+        }
+        count += known ? 0 : 1;
+    }
+    return count;
+}
+
+TEST(SurfaceSummary, NewAreaIsThatOfPartsWithNoneBesideThem) {
+    for (std::uint32_t seed = 1; seed <= 6; ++seed) {
+        SCOPED_TRACE("seed " + std::to_string(seed));
+        test::RandomScene scene(seed);
+        PixelGraph graph{GraphOptions()};
+        SurfaceSummary summary(kCell, kPart);
+        std::size_t some = 0;
+        for (int i = 0; i < 5; ++i) {
+            const Eigen::Vector3d eye = scene.place({-0.3, -0.8, -0.5}, {0.4, 0.8, 0.5});
+            const View view =
+                scene.see(lookAt(eye, scene.place({2.3, -0.6, -0.4}, {2.5, 0.6, 0.4})));
+            const Parts before = partsOf(summary);
+            graph.merge(view);
+            summary.update(graph, view);
+            const Parts now = partsOf(summary);
+            const std::size_t count = newIn(now, before);
+            EXPECT_DOUBLE_EQ(summary.newArea(), static_cast<double>(count) * kPart * kPart / 1.5);
+            some += i > 0 && count > 0 ? 1 : 0;
+            if (i == 0) {
+                EXPECT_EQ(now, partsOf(graph, summary));
+            }
+        }
+        EXPECT_GT(some, 0U);
+    }
+}
+
+TEST(SurfaceSummary, NewAreaOfAWallIsItsAreaAndThenNothing) {
+    PixelGraph graph{GraphOptions()};
+    SurfaceSummary summary(kCell, kPart);
+    // Aslant to all axes, a patch of 0.5 by 0.4 m nearly: 256 x 192 pixels at f = 210, 0.4 m away.
+    const Eigen::Vector3d axis = Eigen::Vector3d(1.0, 0.7, -0.6).normalized();
+    const auto wall = [&](const Eigen::Vector3d& o, const Eigen::Vector3d& d) {
+        return std::optional((0.4 - o.dot(axis)) / d.dot(axis));
+    };
+    const View view = test::viewOf(lookAt(Eigen::Vector3d::Zero(), axis), wall);
+    graph.merge(view);
+    summary.update(graph, view);
+    const double area = 256.0 * 192.0 * std::pow(0.4 / 210, 2);
+    // A sheet with this normal crosses more parts than one does on average.
+    const double more = axis.cwiseAbs().sum() / 1.5;
+    EXPECT_NEAR(summary.newArea(), area * more, 0.06 * area);
+    graph.merge(view);
+    summary.update(graph, view);
+    EXPECT_EQ(summary.newArea(), 0.0);
+}
+
+TEST(SurfaceSummary, HoldsSurfaceOnTheBorderOfBlocks) {
+    // Rounding puts the points of the wall x = 0 on one side of it and the vertices on the other.
+    // The wall y = 0 is seen from afar, one pixel in 2 cm of it.
+    const auto vertical = [](const Eigen::Vector3d& o, const Eigen::Vector3d& d) {
+        return d.y() < 1e-9 ? std::nullopt : std::optional(-o.y() / d.y());
+    };
+    const View across = test::viewOf(lookAt({0.1, -4, 0.1}, {0.1, 0, 0.1}), vertical);
+    for (const double x : {-1e-6, 0.0, 1e-6}) {
+        PixelGraph graph{GraphOptions()};
+        SurfaceSummary summary(kCell, kPart);
+        for (const View& view :
+             {test::viewOf(lookAt({-1, 0, 0}, Eigen::Vector3d::Zero()), test::wall(x)), across}) {
+            graph.merge(view);
+            summary.update(graph, view);
+        }
+        std::size_t vertices = 0;
+        for (const auto& [key, block] : summary.blocks()) {
+            for (const SurfaceCell& cell : block.cells) {
+                vertices += cell.vertices;
+            }
+        }
+        EXPECT_EQ(vertices, graph.vertexCount()) << x;
+    }
+}
+
+}  // namespace
+}  // namespace riftmap
