@@ -232,6 +232,7 @@ std::vector<std::uint8_t> CoverageJudge::trueVerdicts(const std::vector<float>& 
     const auto radius = static_cast<float>(reach);
     const PointIndex index(open, radius);
     std::vector<std::uint8_t> out;
+    out.reserve(places.size());
     for (const Eigen::Vector3f& place : places) {
         out.push_back(index.nearest(place, radius) ? 0 : 1);
     }

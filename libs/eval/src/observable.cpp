@@ -81,6 +81,7 @@ class SightFinder {
     /// Points around a circle, each the golden angle on from the one before.
     static std::vector<Eigen::Vector2d> goldenCircle(int count) {
         std::vector<Eigen::Vector2d> points;
+        points.reserve(static_cast<std::size_t>(count));
         for (int k = 0; k < count; ++k) {
             points.emplace_back(std::cos(kGoldenAngle * k), std::sin(kGoldenAngle * k));
         }

@@ -83,9 +83,8 @@ ReachableSpace::ReachableSpace(const RayCaster& caster, const ViewSpace& space, 
 Eigen::Vector3d ReachableSpace::position(std::size_t node) const {
     const auto nx = static_cast<std::size_t>(size_.x());
     const auto ny = static_cast<std::size_t>(size_.y());
-    return origin_ + grid_ * Eigen::Vector3d(static_cast<double>(node % nx),
-                                             static_cast<double>(node / nx % ny),
-                                             static_cast<double>(node / nx / ny));
+    const Eigen::Matrix<std::size_t, 3, 1> at(node % nx, node / nx % ny, node / nx / ny);
+    return origin_ + grid_ * at.cast<double>();
 }
 
 std::ptrdiff_t ReachableSpace::nearestNode(const Eigen::Vector3d& place) const {
@@ -112,8 +111,8 @@ bool ReachableSpace::stepClear(std::size_t a, std::size_t b) const {
 template <class F>
 bool ReachableSpace::anyNodeAround(const Eigen::Vector3d& place, F&& f) const {
     for (int i = 0; i < 27; ++i) {
-        const Eigen::Vector3d offset(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
-        const std::ptrdiff_t node = nearestNode(place + grid_ * offset);
+        const Eigen::Vector3i offset(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
+        const std::ptrdiff_t node = nearestNode(place + grid_ * offset.cast<double>());
         if (node >= 0 && f(static_cast<std::size_t>(node))) {
             return true;
         }

@@ -302,7 +302,11 @@ SurfaceSummary::Block SurfaceSummary::build(const PixelGraph& graph, std::uint64
     const Eigen::Vector3i corner = unpack(blockKey) * n;
     const Eigen::Vector3d min = corner.cast<double>() * cell_;
     const Eigen::Vector3d max = min + Eigen::Vector3d::Constant(n * cell_);
-    std::vector<Sums> sums(n * n * n);
+    std::vector<Sums> sums(std::size_t{n} * n * n);
+    const auto sumsAt = [&](int x, int y, int z) -> Sums& {
+        const std::ptrdiff_t i = (std::ptrdiff_t{z} * n + y) * n + x;
+        return sums[static_cast<std::size_t>(i)];
+    };
     graph.forEachVertexIn(min.cast<float>(), max.cast<float>(), [&](VertexId id) {
         const Vertex v = graph.vertex(id);
         const Eigen::Vector3d p = v.position.cast<double>();
@@ -310,7 +314,7 @@ SurfaceSummary::Block SurfaceSummary::build(const PixelGraph& graph, std::uint64
         if ((at.array() < 0).any() || (at.array() >= n).any()) {
             return;  // on the outer face: belongs to the next block
         }
-        Sums& s = sums[static_cast<std::size_t>((at.z() * n + at.y()) * n + at.x())];
+        Sums& s = sumsAt(at.x(), at.y(), at.z());
         ++s.vertices;
         const Eigen::Array3d inCells = p.array() / cell_;
         s.parts |=
@@ -347,7 +351,7 @@ SurfaceSummary::Block SurfaceSummary::build(const PixelGraph& graph, std::uint64
     for (int z = 0; z < n; ++z) {
         for (int y = 0; y < n; ++y) {
             for (int x = 0; x < n; ++x) {
-                const Sums& s = sums[static_cast<std::size_t>((z * n + y) * n + x)];
+                const Sums& s = sumsAt(x, y, z);
                 if (s.vertices > 0) {
                     block.cells.push_back(
                         toCell(s, pack(corner + Eigen::Vector3i(x, y, z)), cell_));

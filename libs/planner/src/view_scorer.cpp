@@ -19,8 +19,8 @@ constexpr float kFar = std::numeric_limits<float>::infinity();
 }  // namespace
 
 struct ViewScorer::DepthBuffer {
-    int width, height;
-    float fx, fy, cx, cy;  ///< [px of the buffer]
+    int width = 0, height = 0;
+    float fx = 0, fy = 0, cx = 0, cy = 0;  ///< [px of the buffer]
     std::vector<float> depth;
 
     float& at(int column, int row) {
@@ -56,7 +56,6 @@ ViewScorer::ViewScorer(const SensorModel& sensor, const SurfaceSummary& summary,
                        const Weights& weights)
     : sensor_(sensor),
       summary_(&summary),
-      ledger_(&ledger),
       space_(&space),
       weights_(weights),
       resolution_(resolution),

@@ -51,7 +51,7 @@ struct PageBounds {
 };
 
 /// 64 vertices of one block as arrays.
-struct Page {
+struct Page {  // NOLINT(cppcoreguidelines-pro-type-member-init): see below
     static constexpr std::uint32_t kSize = 64;
     static constexpr std::uint32_t kInline = 4;  ///< half-edges stored beside the vertex
     static constexpr std::uint64_t kHighBits = 0x0001000100010001ULL * compact::kHighBit;

@@ -123,7 +123,6 @@ class ViewScorer {
 
     SensorModel sensor_;
     const SurfaceSummary* summary_;
-    const RiftLedger* ledger_;
     const FreeSpace* space_;
     Weights weights_;
     double resolution_;
