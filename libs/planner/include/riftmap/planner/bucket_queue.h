@@ -40,7 +40,7 @@ class BucketQueue {
     double floor() const { return start_ + current_ / bucketsPerKey_; }
 
     /// The current bucket; it grows at its end by keys that fall into it while it is worked off.
-    const std::vector<VertexId>& bucket() const { return buckets_[current_]; }
+    const std::vector<VertexId>& bucket() const { return buckets_[at(current_)]; }
 
  private:
     struct Waiting {
