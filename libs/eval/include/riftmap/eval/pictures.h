@@ -52,7 +52,7 @@ class CoveragePictures {
  private:
     struct Eye {
         Pose pose;
-        double focal;  ///< [image widths]
+        double focal = 0;  ///< [image widths]
     };
     struct Seen {
         Eigen::Vector3d point = Eigen::Vector3d::Zero();
