@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The choice of views around an object that stands alone: a tour over views that complement each
 // other.
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
