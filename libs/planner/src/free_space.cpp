@@ -24,7 +24,9 @@ const std::array<Eigen::Vector3i, 6> kFaces = {Eigen::Vector3i(1, 0, 0), Eigen::
 /// Depths of a view for questions about rectangles: least depth and share of measured pixels.
 class DepthRectangles {
  public:
-    DepthRectangles(const View& view, const SensorModel& sensor, bool backgroundIsFree)
+    /// `empty`: pixels without a match that are measured all the same, as nothing within the range.
+    DepthRectangles(const View& view, const SensorModel& sensor, bool backgroundIsFree,
+                    const std::vector<std::uint8_t>& empty)
         : width_(view.disparity.width), height_(view.disparity.height) {
         const auto n = static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_);
         std::vector<float> depth(n, kFar);
@@ -38,10 +40,10 @@ class DepthRectangles {
                 if (valid) {
                     depth[i] = static_cast<float>(
                         view.camera.depth(static_cast<double>(view.disparity.disparity[i])));
-                } else if (backgroundIsFree) {
+                } else if (backgroundIsFree || empty[i] != 0) {
                     depth[i] = static_cast<float>(sensor.farLimit);
                 }
-                inRow += valid ? 1 : 0;
+                inRow += valid || empty[i] != 0 ? 1 : 0;
                 measured_[sum(column + 1, row + 1)] = measured_[sum(column + 1, row)] + inRow;
             }
         }
@@ -105,7 +107,7 @@ class DepthRectangles {
 
     int width_, height_;
     std::vector<Level> levels_;
-    std::vector<int> measured_;  ///< integral image of the valid pixels
+    std::vector<int> measured_;  ///< integral image of the measured pixels
 };
 
 /// What lies before the camera within the image and the range, give or take a pixel.
@@ -199,7 +201,7 @@ Eigen::Vector3d FreeSpace::snap(const Eigen::Vector3d& point) const {
 void FreeSpace::declareFreeOutside(const Eigen::AlignedBox3d& surfaces) {
     for (std::size_t i = 0; i < voxels_.size(); ++i) {
         if (surfaces.exteriorDistance(centre(coordinates(i))) > 0.5 * voxel_) {
-            voxels_[i] |= kFreeBit | kKnownBit | kSeenBit;
+            voxels_[i] |= kFreeBit | kKnownBit | kSeenBit | kMeasuredBit;
         }
     }
 }
@@ -214,8 +216,37 @@ void FreeSpace::declareFree(const Eigen::Vector3d& middle, double radius) {
     }
 }
 
+bool FreeSpace::nothingTooNear(const View& view, const SensorModel& sensor, int column,
+                               int row) const {
+    const StereoCamera& c = view.camera;
+    const Eigen::Vector3d ray((column - c.cx) / c.fx, (row - c.cy) / c.fy, 1.0);
+    const double length = ray.norm();
+    const Eigen::Vector3d step = view.world_T_camera.rotation * ray / length;
+    const double end = sensor.nearLimit * length;
+    const double stride = 0.25 * voxel_;
+    for (double s = sensor.clearance; s < end + stride; s += stride) {
+        const Eigen::Vector3i v =
+            voxelOf(view.world_T_camera.translation + std::min(s, end) * step);
+        if (!inside(v) || (voxels_[index(v)] & (kMeasuredBit | kSurfaceBit)) != kMeasuredBit) {
+            return false;
+        }
+    }
+    return true;
+}
+
 void FreeSpace::carve(const View& view, const SensorModel& sensor, bool backgroundIsFree) {
-    const DepthRectangles depth(view, sensor, backgroundIsFree);
+    std::vector<std::uint8_t> empty(view.disparity.disparity.size(), 0);
+    if (sensor.exactDepth) {
+        parallelForEach(view.disparity.height, 8, [&](int row) {
+            for (int column = view.disparity.firstColumn; column < view.disparity.width; ++column) {
+                empty[view.disparity.index(column, row)] =
+                    !view.disparity.valid(column, row) && nothingTooNear(view, sensor, column, row)
+                        ? 1
+                        : 0;
+            }
+        });
+    }
+    const DepthRectangles depth(view, sensor, backgroundIsFree, empty);
     const StereoCamera& camera = view.camera;
     const Pose camera_T_world = view.world_T_camera.inverse();
     const double radius = 0.87 * voxel_;  // of the ball around a voxel
@@ -232,7 +263,7 @@ void FreeSpace::carve(const View& view, const SensorModel& sensor, bool backgrou
             Eigen::Vector3d p = first + begin * step;
             std::size_t i = index({begin, y, z});
             for (int x = begin; x < end; ++x, ++i, p += step) {
-                if (p.z() < radius || p.z() > sensor.farLimit || (voxels_[i] & kFreeBit) != 0) {
+                if (p.z() < radius || p.z() > sensor.farLimit || (voxels_[i] & kMeasuredBit) != 0) {
                     continue;
                 }
                 const Eigen::Vector2d uv = camera.project(p);
@@ -249,7 +280,8 @@ void FreeSpace::carve(const View& view, const SensorModel& sensor, bool backgrou
                 // A voxel that the surface cuts is never free as a whole, and need not hold
                 // a vertex: it is known nevertheless.
                 const float at = depth.least(c, r, c, r);
-                const bool measured = view.disparity.valid(c, r);
+                const bool measured =
+                    view.disparity.valid(c, r) || empty[view.disparity.index(c, r)] != 0;
                 if ((measured || backgroundIsFree) &&
                     p.z() < static_cast<double>(at) + 0.5 * voxel_) {
                     voxels_[i] |= kKnownBit;
@@ -266,7 +298,7 @@ void FreeSpace::carve(const View& view, const SensorModel& sensor, bool backgrou
                 const int f = std::min(r1, height - 1);
                 if (depth.measuredShare(a, b, e, f) >= kMeasured &&
                     static_cast<double>(depth.least(a, b, e, f)) > p.z() + radius) {
-                    voxels_[i] |= kFreeBit;
+                    voxels_[i] |= kFreeBit | kMeasuredBit;
                 }
             }
         }
@@ -312,7 +344,7 @@ FreeSpace::State FreeSpace::at(const Eigen::Vector3d& point) const {
 
 void FreeSpace::noteTry(const Eigen::Vector3d& point) {
     const Eigen::Vector3i v = voxelOf(point);
-    if (inside(v) && (voxels_[index(v)] >> kTryShift) < 15) {
+    if (inside(v) && (voxels_[index(v)] >> kTryShift) < kTries) {
         voxels_[index(v)] = static_cast<std::uint8_t>(voxels_[index(v)] + (1 << kTryShift));
     }
 }
@@ -335,6 +367,7 @@ void FreeSpace::updateClear(double clearance, const Eigen::AlignedBox3d& limits)
         blocking_.assign(voxels_.size(), 0);
         blockers_.assign(voxels_.size(), 0);
         allowed_.resize(voxels_.size());
+        fits_.assign(voxels_.size(), 0);
         for (std::size_t i = 0; i < voxels_.size(); ++i) {
             allowed_[i] = limits.contains(centre(coordinates(i))) ? 1 : 0;
         }
@@ -364,6 +397,11 @@ void FreeSpace::updateClear(double clearance, const Eigen::AlignedBox3d& limits)
     };
     for (const std::size_t i : changed) {
         const Eigen::Vector3i v = coordinates(i);
+        for (const Eigen::Vector3i& o : offsets) {
+            if (inside(v + o)) {
+                fits_[index(v + o)] = 0;
+            }
+        }
         recount(v);
         for (const Eigen::Vector3i& f : kFaces) {
             if (inside(v + f)) {
@@ -378,7 +416,34 @@ void FreeSpace::updateClear(double clearance, const Eigen::AlignedBox3d& limits)
     }
 }
 
-void FreeSpace::searchFrom(const Eigen::Vector3i& start) {
+void FreeSpace::forget(const Eigen::AlignedBox3d& changed) {
+    if (fits_.empty()) {
+        return;
+    }
+    const Eigen::Vector3d reach = Eigen::Vector3d::Constant(clearance_ + voxel_);
+    const Eigen::Vector3i first = voxelOf(changed.min() - reach).cwiseMax(0);
+    const Eigen::Vector3i last =
+        voxelOf(changed.max() + reach).cwiseMin(size_ - Eigen::Vector3i::Ones());
+    for (int z = first.z(); z <= last.z(); ++z) {
+        for (int y = first.y(); y <= last.y(); ++y) {
+            for (int x = first.x(); x <= last.x(); ++x) {
+                fits_[index({x, y, z})] = 0;
+            }
+        }
+    }
+}
+
+bool FreeSpace::fitsAt(std::size_t voxel, const Fits& fits) {
+    if (passable_[voxel] == 0 || allowed_[voxel] == 0) {
+        return false;
+    }
+    if (fits_[voxel] == 0) {
+        fits_[voxel] = fits(centre(coordinates(voxel))) ? 2 : 1;
+    }
+    return fits_[voxel] == 2;
+}
+
+void FreeSpace::searchFrom(const Eigen::Vector3i& start, const Fits& fits) {
     distance_.assign(voxels_.size(), kFar);
     parent_.assign(voxels_.size(), kNoParent);
     struct Step {
@@ -416,7 +481,8 @@ void FreeSpace::searchFrom(const Eigen::Vector3i& start) {
                     continue;
                 }
                 const auto j = static_cast<std::uint32_t>(static_cast<std::ptrdiff_t>(i) + s.jump);
-                if (clear_[j] != 0 && d + s.length < distance_[j]) {
+                const bool clear = clear_[j] != 0;
+                if ((clear || fits) && d + s.length < distance_[j] && (clear || fitsAt(j, fits))) {
                     distance_[j] = d + s.length;
                     parent_[j] = i;
                     const auto to = static_cast<std::size_t>(distance_[j] / width);
@@ -430,14 +496,21 @@ void FreeSpace::searchFrom(const Eigen::Vector3i& start) {
     }
 }
 
-bool FreeSpace::knownAround(const Eigen::Vector3d& point, double radius) const {
+bool FreeSpace::knownAround(const Eigen::Vector3d& point, double radius, bool corners) const {
     const Eigen::Vector3i first = voxelOf(point - Eigen::Vector3d::Constant(radius));
     const Eigen::Vector3i last = voxelOf(point + Eigen::Vector3d::Constant(radius));
     if (!inside(first) || !inside(last)) {
         return false;
     }
-    const auto isSurface = [this](const Eigen::Vector3i& v) {
-        return inside(v) && (voxels_[index(v)] & kSurfaceBit) != 0;
+    const auto touchesSurface = [&](const Eigen::Vector3i& v) {
+        for (int i = 0; i < 27; ++i) {
+            const Eigen::Vector3i o(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
+            if ((corners || o.squaredNorm() == 1) && inside(v + o) &&
+                (voxels_[index(v + o)] & kSurfaceBit) != 0) {
+                return true;
+            }
+        }
+        return false;
     };
     for (int z = first.z(); z <= last.z(); ++z) {
         for (int y = first.y(); y <= last.y(); ++y) {
@@ -450,10 +523,7 @@ bool FreeSpace::knownAround(const Eigen::Vector3d& point, double radius) const {
                     (voxel & (kFreeBit | kSurfaceBit)) != 0) {
                     continue;
                 }
-                const bool cut = (voxel & kKnownBit) != 0 &&
-                                 std::any_of(kFaces.begin(), kFaces.end(),
-                                             [&](const auto& f) { return isSurface(v + f); });
-                if (!cut) {
+                if ((voxel & kKnownBit) == 0 || !touchesSurface(v)) {
                     return false;
                 }
             }
@@ -484,13 +554,18 @@ std::optional<Eigen::Vector3d> FreeSpace::nearestClear(const Eigen::Vector3d& po
     return nearest;
 }
 
-void FreeSpace::updateReach(const Eigen::Vector3d& start) {
+std::size_t FreeSpace::updateReach(const Eigen::Vector3d& start, const Fits& fits) {
     start_ = start;
     const Eigen::Vector3i v = voxelOf(start);
     if (!inside(v)) {
         throw std::invalid_argument("free space: the camera is outside of the workspace");
     }
-    searchFrom(v);  // the camera is there, whatever is known of that voxel
+    searchFrom(v, fits);  // the camera is there, whatever is known of that voxel
+    std::size_t reached = 0;
+    for (std::size_t i = 0; i < voxels_.size(); ++i) {
+        reached += clear_[i] != 0 && std::isfinite(distance_[i]) ? 1 : 0;
+    }
+    return reached;
 }
 
 double FreeSpace::distanceTo(const Eigen::Vector3d& point) const {

@@ -145,6 +145,13 @@ void Knowledge::update(const View& view) {
     space_.declareFree(camera_.translation, limits_.clearance + 2.2 * space_.voxelSize());
     space_.carve(view, sensor_, options_.backgroundIsFree);
     updateSurface(space_);
+    for (std::size_t i = 0; i < summary_.changed().size(); ++i) {
+        const auto it = summary_.blocks().find(summary_.changed()[i]);
+        const SurfaceSummary::Block& former = summary_.former()[i];
+        if (it != summary_.blocks().end() || !former.cells.empty()) {
+            space_.forget(it != summary_.blocks().end() ? it->second.box : former.box);
+        }
+    }
     if (hull_) {
         hull_->carve(view, sensor_, options_.backgroundIsFree);
         updateSurface(*hull_);
@@ -181,7 +188,34 @@ void Knowledge::updateReach() {
             anchor_ = *beside;
         }
     }
-    space_.updateReach(anchor_);
+    const FreeSpace::Fits fits = [this](const auto& p) { return fitsBetweenVoxels(p); };
+    reached_ = space_.updateReach(anchor_, passages_ ? fits : FreeSpace::Fits());
+}
+
+bool Knowledge::openPassages() {
+    constexpr std::size_t kEvery = 20;  // [views] as a rule there are none, and a look takes time
+    constexpr double kLeadOn = 1.02;    // less is a corner that voxels miss, and ways take longer
+    if (passages_ || views_ < nextLook_) {
+        return false;
+    }
+    nextLook_ = views_ + kEvery;
+    const std::size_t before = reached_;
+    passages_ = true;
+    updateReach();
+    passages_ = static_cast<double>(reached_) > kLeadOn * static_cast<double>(before);
+    if (!passages_) {
+        updateReach();
+    }
+    return passages_;
+}
+
+/// True if the camera keeps its clearance here, and on the straight ways to the centres of the
+/// voxels around.
+bool Knowledge::fitsBetweenVoxels(const Eigen::Vector3d& centre) const {
+    const double half = std::sqrt(0.75) * space_.voxelSize();
+    const double radius = std::hypot(clearance(), half);
+    return space_.knownAround(centre, radius, true) &&
+           !graph_->nearest(centre.cast<float>(), static_cast<float>(radius));
 }
 
 /// True if the camera keeps its clearance on the straight way, by the surface itself.
@@ -191,7 +225,7 @@ bool Knowledge::fits(const Eigen::Vector3d& from, const Eigen::Vector3d& to) con
     const auto radius = static_cast<float>(clearance());
     for (int i = 0; i <= n; ++i) {
         const Eigen::Vector3d p = from + (to - from) * (static_cast<double>(i) / n);
-        if (!cameraBox_.contains(p) || !space_.knownAround(p, clearance()) ||
+        if (!cameraBox_.contains(p) || !space_.knownAround(p, clearance(), false) ||
             graph_->nearest(p.cast<float>(), radius)) {
             return false;
         }

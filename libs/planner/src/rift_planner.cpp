@@ -441,7 +441,11 @@ std::optional<ViewPlan> Choice::make() {
     std::erase_if(candidates_, [&](const Candidate& c) {
         return c.score.gain < minGain() || c.score.nearShare > 0.3;
     });
-    if (const Candidate* b = best()) {
+    const Candidate* b = best();
+    if ((b == nullptr || b->score.gain < 4 * minGain()) && k_.openPassages()) {
+        return Choice(k_, pool_, memory_).make();
+    }
+    if (b != nullptr) {
         if (auto plan = planFor(*b)) {
             return plan;
         }

@@ -12,6 +12,8 @@ SensorModel SensorModel::of(const View& view, const PlatformLimits& limits) {
     model.camera = view.camera;
     model.firstColumn = view.disparity.firstColumn;
     model.nearLimit = limits.nearLimit;
+    model.clearance = limits.clearance;
+    model.exactDepth = limits.exactDepth;
     if (std::isfinite(view.disparity.maxDisparity)) {
         model.nearLimit = std::max(
             model.nearLimit, view.camera.depth(static_cast<double>(view.disparity.maxDisparity)));

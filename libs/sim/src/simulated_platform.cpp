@@ -383,6 +383,7 @@ PlatformLimits SimulatedPlatform::limits() const {
     }
     limits.nearLimit = parts_->options.camera.nearLimit();
     limits.farLimit = parts_->options.camera.farLimit;
+    limits.exactDepth = parts_->options.noise.level == NoiseOptions::Level::kN0;
     return limits;
 }
 

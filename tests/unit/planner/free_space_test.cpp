@@ -62,6 +62,99 @@ TEST(FreeSpace, pixelsWithoutAMatchAreKnownOnlyWhereTheBackgroundIsFree) {
     EXPECT_TRUE(std::isinf(open.distanceTo({1.5, 0, 0})));
 }
 
+/// The way ahead has no match, as before an open sky; the camera is at the origin.
+class Sky : public testing::Test {
+ protected:
+    void lookAhead() {
+        space.carve(test::viewOf(lookAt({0, 0, 0}, {1, 0, 0}),
+                                 [](const auto&, const auto&) { return std::optional<double>(); }),
+                    sensor, false);
+    }
+    /// A view across the first metre before the camera.
+    void lookAcross() {
+        const View view = test::viewOf(
+            lookAt({0.5, -1.8, 0}, {0.5, 0, 0}),
+            [](const Eigen::Vector3d& o, const Eigen::Vector3d& d) {
+                return d.y() > 1e-9 ? std::optional((1.5 - o.y()) / d.y()) : std::nullopt;
+            });
+        space.carve(view, sensor, false);
+    }
+    bool canFlyTo(const Eigen::Vector3d& place) {
+        space.updateClear(0.0, kBox);
+        space.updateReach({0.5, 0, 0});
+        return std::isfinite(space.distanceTo(place));
+    }
+
+    FreeSpace space{kBox, 0.1};
+    SensorModel sensor = [] {
+        SensorModel s = sensorOf(test::viewOf(lookAt({0, 0, 0}, {1, 0, 0}), test::wall(3)));
+        s.nearLimit = 0.5;
+        s.clearance = 0.1;
+        s.exactDepth = true;
+        return s;
+    }();
+    const Eigen::Vector3d ahead{3, 0, 0};
+};
+
+TEST_F(Sky, isFreeToFlyInOnceNothingCanBeNearerThanTheRange) {
+    lookAhead();  // a surface before the near limit has no match either
+    EXPECT_EQ(space.at(ahead), State::kUnknown);
+    lookAcross();
+    lookAhead();
+    EXPECT_EQ(space.at(ahead), State::kFree);
+    EXPECT_TRUE(canFlyTo(ahead));
+}
+
+TEST_F(Sky, isUnknownIfAMatchMayHaveBeenMissed) {
+    sensor.exactDepth = false;
+    lookAcross();
+    lookAhead();
+    EXPECT_EQ(space.at(ahead), State::kUnknown);
+}
+
+TEST_F(Sky, isUnknownBehindWhatIsNearerThanTheRange) {
+    lookAcross();
+    space.addSurface({0.35, 0.02, 0.02});
+    lookAhead();
+    EXPECT_EQ(space.at(ahead), State::kUnknown);
+}
+
+TEST_F(Sky, thatTheCameraOnlyTookForFreeProvesNothing) {
+    space.declareFree({0, 0, 0}, 0.8);  // so that it may take its first step
+    lookAhead();
+    EXPECT_EQ(space.at(ahead), State::kUnknown);
+}
+
+TEST(FreeSpace, waysLeadThroughPassagesThatOnlyTheSurfaceItselfShows) {
+    FreeSpace space(kBox, 0.1);
+    space.declareFreeOutside(
+        Eigen::AlignedBox3d(Eigen::Vector3d(1, -2, -2), Eigen::Vector3d(2, 2, 2)));
+    for (double x = 0.9; x < 2.15; x += 0.05) {
+        space.declareFree({x, 0.05, 0.05}, 0.35);
+    }
+    space.updateClear(0.3, kBox);  // wants a voxel more than the passage has
+    const Eigen::Vector3d start(0.05, 0.05, 0.05);
+    const Eigen::Vector3d goal(3.05, 0.05, 0.05);
+    const std::size_t reached = space.updateReach(start);
+    EXPECT_TRUE(std::isinf(space.distanceTo(goal)));
+    int asked = 0;
+    const auto fits = [&](const Eigen::Vector3d& p) {
+        ++asked;
+        return std::hypot(p.y() - 0.05, p.z() - 0.05) < 0.04;
+    };
+    EXPECT_GT(space.updateReach(start, fits), reached + 100);
+    EXPECT_LT(space.distanceTo(goal), 3.2);
+    EXPECT_GT(asked, 10);
+
+    asked = 0;
+    space.updateReach(start, fits);
+    EXPECT_EQ(asked, 0);  // nothing changed
+    const Eigen::Vector3d middle(1.5, 0, 0);
+    space.forget(Eigen::AlignedBox3d(middle, middle));
+    space.updateReach(start, [](const auto&) { return false; });
+    EXPECT_TRUE(std::isinf(space.distanceTo(goal)));
+}
+
 TEST(FreeSpace, waysKeepTheClearance) {
     FreeSpace space(kBox, 0.1);
     space.declareFreeOutside(
@@ -96,9 +189,9 @@ TEST(FreeSpace, besideKnownSurfaceOnlyTheSurfaceIsInTheWay) {
     const View view = test::viewOf(lookAt({0, 0, 0}, {1, 0, 0}), test::wall(2.03));
     space.carve(view, sensorOf(view), false);
     const Eigen::Vector3d beside(1.8, 0, 0);
-    EXPECT_TRUE(space.knownAround({1.2, 0, 0}, 0.2));
+    EXPECT_TRUE(space.knownAround({1.2, 0, 0}, 0.2, false));
     EXPECT_FALSE(
-        space.knownAround(beside, 0.22));  // voxels that are not free, and why is not known
+        space.knownAround(beside, 0.22, false));  // voxels that are not free, and why is not known
     std::vector<Eigen::Vector3d> wall;
     for (double y = -1; y < 1; y += 0.02) {
         for (double z = -1; z < 1; z += 0.02) {
@@ -106,9 +199,9 @@ TEST(FreeSpace, besideKnownSurfaceOnlyTheSurfaceIsInTheWay) {
         }
     }
     space.setSurface(wall);
-    EXPECT_TRUE(space.knownAround(beside, 0.22));
-    EXPECT_FALSE(space.knownAround({1.2, 0.75, 0}, 0.3));  // beside the field of view
-    EXPECT_FALSE(space.knownAround({-1.95, 0, 0}, 0.3));   // reaches out of the grid
+    EXPECT_TRUE(space.knownAround(beside, 0.22, false));
+    EXPECT_FALSE(space.knownAround({1.2, 0.75, 0}, 0.3, false));  // beside the field of view
+    EXPECT_FALSE(space.knownAround({-1.95, 0, 0}, 0.3, false));   // reaches out of the grid
     space.updateClear(0.2, kBox);
     EXPECT_FALSE(space.isClear(beside));
     const auto clear = space.nearestClear(beside, 2, false);

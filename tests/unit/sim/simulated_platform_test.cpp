@@ -157,6 +157,15 @@ TEST(SimulatedPlatform, StepsHaveALongest) {
     EXPECT_NO_THROW(platform->moveAlong({shifted(start, {0.5, 0, 0})}));
 }
 
+TEST(SimulatedPlatform, OnlyExactDepthProvesThatNothingIsThere) {
+    SimulationOptions options = smallRoom();
+    for (const auto level :
+         {NoiseOptions::Level::kN0, NoiseOptions::Level::kN3, NoiseOptions::Level::kN4}) {
+        options.noise.level = level;
+        EXPECT_EQ(makePlatform(options, 1)->limits().exactDepth, level == NoiseOptions::Level::kN0);
+    }
+}
+
 TEST(SimulatedPlatform, AGroundRobotPansAndTiltsAtItsHeight) {
     SimulationOptions options = smallRoom();
     options.platform.kind = PlatformLimits::Kind::kGroundPanTilt;

@@ -28,6 +28,9 @@ struct PlatformLimits {
     double maxTilt = 1.5708;   ///< [rad]
     double nearLimit = 0.0;    ///< surfaces nearer than this are not measured [m]
     double farLimit = 1e3;     ///< nor those farther [m]
+    /// Every pixel that meets a surface within the range is measured: one without a match shows
+    /// that there is none (exact depth). A matcher cannot say so.
+    bool exactDepth = false;
 };
 
 /// A path that touches a surface or leaves the workspace.

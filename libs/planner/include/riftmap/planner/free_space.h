@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -19,6 +20,7 @@ namespace riftmap {
 class FreeSpace {
  public:
     enum class State { kUnknown, kFree, kSurface };
+    using Fits = std::function<bool(const Eigen::Vector3d&)>;
 
     /// Covers `box`. Throws std::invalid_argument for an empty box, a voxel size that is not
     /// positive or more than 2^27 voxels.
@@ -33,7 +35,10 @@ class FreeSpace {
     /// Free because the camera is there with its clearance.
     void declareFree(const Eigen::Vector3d& centre, double radius);
     /// What a view saw through. `backgroundIsFree`: rays that met nothing within the range make
-    /// voxels known (no surface to look for there), but not free to fly through.
+    /// voxels known (no surface to look for there), but not free to fly through: a surface nearer
+    /// than the range has no match either. With `sensor.exactDepth` such a ray is measured as far
+    /// as the range goes if its part before the near limit is within the clearance or was measured
+    /// as free by earlier views.
     void carve(const View& view, const SensorModel& sensor, bool backgroundIsFree);
     /// Marks the voxels of these points as surface, and no others.
     void setSurface(const std::vector<Eigen::Vector3d>& points);
@@ -69,15 +74,22 @@ class FreeSpace {
     /// proportion to them, and little for the grid.
     void updateClear(double clearance, const Eigen::AlignedBox3d& limits);
     /// After updateClear(): which of those can be reached from `start`, straight from voxel centre
-    /// to voxel centre, and how far that is. The start's own voxel counts as clear.
-    void updateReach(const Eigen::Vector3d& start);
+    /// to voxel centre, and how far that is. The start's own voxel counts as clear. `fits`, if
+    /// given: whether the camera fits at the centre of a voxel that is free but too near to others
+    /// for updateClear(), and on the straight ways to it; its answers are kept until forget().
+    /// Returns how many of the voxels reached are clear.
+    std::size_t updateReach(const Eigen::Vector3d& start, const Fits& fits = {});
+    /// The surface within this box changed: `fits` is to be asked again.
+    void forget(const Eigen::AlignedBox3d& changed);
     bool isClear(const Eigen::Vector3d& point) const {
         const Eigen::Vector3i v = voxelOf(point);
         return inside(v) && clear_[index(v)] != 0;
     }
     /// True if all that lies nearer than `radius` to this place was seen through, or is surface
-    /// or cut by surface: then only the surface that is known has to be kept away from.
-    bool knownAround(const Eigen::Vector3d& point, double radius) const;
+    /// or cut by surface: then only the surface that is known has to be kept away from. A voxel is
+    /// cut whose middle was seen and that shares a face with one of surface, or with `corners` an
+    /// edge or a corner.
+    bool knownAround(const Eigen::Vector3d& point, double radius, bool corners) const;
     /// Centre of the nearest voxel, at most `reach` voxels away along each axis, that is clear (or
     /// with `reached` can be reached as well); nothing if there is none.
     std::optional<Eigen::Vector3d> nearestClear(const Eigen::Vector3d& point, int reach,
@@ -100,7 +112,8 @@ class FreeSpace {
                                                   ///< to look for surface; not enough to fly there
     static constexpr std::uint8_t kSurfaceBit = 4;
     static constexpr std::uint8_t kSeenBit = 8;  ///< the line of sight goes on behind its centre
-    static constexpr int kTryShift = 4;          ///< count of vain tries in the upper bits
+    static constexpr std::uint8_t kMeasuredBit = 16;  ///< free by a view, not as it was declared
+    static constexpr int kTryShift = 5;               ///< count of vain tries in the upper bits
 
     bool inside(const Eigen::Vector3i& v) const {
         return (v.array() >= 0).all() && (v.array() < size_.array()).all();
@@ -121,7 +134,11 @@ class FreeSpace {
     }
     /// Something not known to be free, beside what is.
     bool blocks(std::size_t voxel) const;
-    void searchFrom(const Eigen::Vector3i& start);
+    /// Of pixels without a match: true if nothing lies nearer than the near limit, by `sensor`'s
+    /// clearance and by what was measured before.
+    bool nothingTooNear(const View& view, const SensorModel& sensor, int column, int row) const;
+    void searchFrom(const Eigen::Vector3i& start, const Fits& fits);
+    bool fitsAt(std::size_t voxel, const Fits& fits);
 
     Eigen::AlignedBox3d box_;
     double voxel_;
@@ -137,6 +154,7 @@ class FreeSpace {
     double clearance_ = -1;              ///< of updateClear()
     Eigen::AlignedBox3d limits_;
     std::vector<std::uint8_t> clear_;    ///< 1 = the ball fits here
+    std::vector<std::uint8_t> fits_;     ///< answers of `fits`: 0 not asked, 1 no, 2 yes
     std::vector<float> distance_;        ///< from the start [m]
     std::vector<std::uint32_t> parent_;  ///< voxel before it on the way
     Eigen::Vector3d start_ = Eigen::Vector3d::Zero();

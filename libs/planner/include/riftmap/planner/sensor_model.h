@@ -15,6 +15,8 @@ struct SensorModel {
     double nearLimit = 0;       ///< depth z [m]; nearer surfaces are not measured
     double farLimit = 1e3;      ///< depth z [m]; nor are those farther
     double sigmaDisparity = 0;  ///< median of the valid pixels [px]
+    double clearance = 0;       ///< around the camera there is nothing nearer than this [m]
+    bool exactDepth = false;    ///< PlatformLimits::exactDepth
 
     /// As the last view was, within the platform's range.
     static SensorModel of(const View& view, const PlatformLimits& limits);

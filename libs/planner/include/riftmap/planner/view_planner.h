@@ -54,6 +54,11 @@ class Knowledge {
     void update(const View& view);
     /// Ways from where the camera is.
     void updateReach();
+    /// Looks for passages too narrow for voxels (a door, the space between a wall and the end of
+    /// the workspace), by the surface itself, and if they lead on, takes them into account from
+    /// then on. True if they do; false if they did before, if next to nothing lies behind them, or
+    /// if it was looked for less than 20 views ago.
+    bool openPassages();
     /// A place where the camera fits, and the way there.
     struct Place {
         Eigen::Vector3d eye;
@@ -92,6 +97,7 @@ class Knowledge {
  private:
     void updateSurface(FreeSpace& space) const;
     bool fits(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const;
+    bool fitsBetweenVoxels(const Eigen::Vector3d& centre) const;
 
     const PixelGraph* graph_;
     PlatformLimits limits_;
@@ -105,6 +111,9 @@ class Knowledge {
     std::optional<FreeSpace> hull_;
     RiftLedger ledger_;
     Pose camera_;
+    bool passages_ = false;
+    std::size_t nextLook_ = 0;                          ///< for passages [views]
+    std::size_t reached_ = 0;                           ///< clear voxels
     Eigen::Vector3d anchor_ = Eigen::Vector3d::Zero();  ///< where ways over voxels begin
     std::size_t views_ = 0;
 };

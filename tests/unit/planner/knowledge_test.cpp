@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Where the camera can get to, by all that is known.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "planner_scene.h"
+#include "riftmap/planner/view_planner.h"
+
+namespace riftmap {
+namespace {
+
+/// A slit between two blocks, 1.2 to 2 metres ahead, and a wall four metres ahead.
+class Slit : public testing::Test {
+ protected:
+    /// Seen from six places, so that the way to the blocks is known; the last one is in front of
+    /// the slit.
+    void see(double half) {
+        for (const Eigen::Vector3d& eye :
+             {Eigen::Vector3d(0, 0.5, 0), Eigen::Vector3d(0, -0.5, 0), Eigen::Vector3d(0, 0, 0.5),
+              Eigen::Vector3d(0, 0, -0.5), Eigen::Vector3d(-1.5, 0, 0), Eigen::Vector3d(0, 0, 0)}) {
+            const View view =
+                test::viewOf(lookAt(eye, eye + Eigen::Vector3d::UnitX()),
+                             [half](const Eigen::Vector3d& o, const Eigen::Vector3d& d) {
+                                 return ahead(half, o, d);
+                             });
+            graph.merge(view);
+            knowledge.update(view);
+        }
+        knowledge.updateReach();
+    }
+    /// Distance along a ray to the blocks' front, the sides of the slit, or the wall.
+    static std::optional<double> ahead(double half, const Eigen::Vector3d& origin,
+                                       const Eigen::Vector3d& ray) {
+        const double front = *test::wall(1.2)(origin, ray);
+        const auto height = [&](double t) { return std::abs((origin + t * ray).z()); };
+        if (height(front) > half) {
+            return front;
+        }
+        const double side = ((ray.z() > 0 ? half : -half) - origin.z()) / ray.z();
+        const double back = *test::wall(2.0)(origin, ray);
+        return height(back) > half ? side : *test::wall(4.0)(origin, ray);
+    }
+    static GraphOptions graphOptions() {
+        GraphOptions o;
+        o.targetResolution = 0.05;
+        return o;
+    }
+    static PlatformLimits limits() {
+        PlatformLimits limits;
+        limits.boxMin = Eigen::Vector3d(-2, -2, -2);
+        limits.boxMax = Eigen::Vector3d(4, 2, 2);
+        limits.clearance = 0.2;
+        limits.farLimit = 6;
+        return limits;
+    }
+    static PlannerOptions options() {
+        PlannerOptions o;
+        o.voxelSize = 0.15;
+        return o;
+    }
+
+    PixelGraph graph{graphOptions()};
+    Knowledge knowledge{graph, limits(), options()};
+    const Eigen::Vector3d behind{2.8, 0, 0};
+};
+
+TEST_F(Slit, tooNarrowForVoxelsIsAPassageAllTheSame) {
+    see(0.45);
+    ASSERT_FALSE(knowledge.placeAt(behind)) << "the test needs a slit that voxels do not see";
+    EXPECT_TRUE(knowledge.openPassages());
+    const auto place = knowledge.placeAt(behind);
+    ASSERT_TRUE(place);
+    Eigen::Vector3d at = knowledge.camera().translation;
+    for (const Pose& pose : knowledge.pathTo(lookAt(place->eye, {4, 0, 0}))) {
+        for (double s = 0; s <= 1; s += 0.05) {  // by the map: the walls are its only surface
+            const Eigen::Vector3d p = at + s * (pose.translation - at);
+            EXPECT_FALSE(graph.nearest(p.cast<float>(), 0.2F)) << p.transpose();
+        }
+        at = pose.translation;
+    }
+    EXPECT_FALSE(knowledge.openPassages());  // they are open by now
+    knowledge.updateReach();
+    EXPECT_TRUE(knowledge.placeAt(behind));
+}
+
+TEST_F(Slit, tooNarrowForTheCameraIsNone) {
+    see(0.22);
+    EXPECT_FALSE(knowledge.openPassages());
+    EXPECT_FALSE(knowledge.placeAt(behind));
+}
+
+}  // namespace
+}  // namespace riftmap
