@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "riftmap/core/parallel.h"
+#include "riftmap/planner/thin_shells.h"
 #include "view_choice.h"
 
 namespace riftmap {
@@ -134,12 +135,16 @@ std::optional<ViewPlan> Choice::makeAround(const Eigen::AlignedBox3d& box) {
     addPlacesAround(box);
     addPool();
     std::vector<FreeSpace::Frontier> frontier = k_.unseen().frontier(box);
-    for (FreeSpace::Frontier& f : frontier) {
-        f.area *= static_cast<float>(
-            memory_.lookedInVain.left(f.centre.cast<double>(), k_.unseen().voxelSize()));
-    }
+    const ThinShells shells(k_.unseen(), k_.summary(), frontier);
+    std::erase_if(frontier, [&](const auto& place) { return shells.hold(place); });
     scorer_.setFrontier(std::move(frontier), k_.unseen().voxelSize());
     worth_ = scorer_.worth();
+    for (std::size_t i = 0; i < scorer_.open().size(); ++i) {
+        const SurfaceCell& cell = scorer_.open()[i]->cell;
+        if (cell.hidden > 0 && shells.touch(cell.hiddenPosition.cast<double>())) {
+            worth_[2 * i] = 0;  // hides the inside only
+        }
+    }
     std::vector<TourView> views(candidates_.size());
     parallelForEach(candidates_.size(), 4, [&](std::size_t i) {
         ViewScorer::Seen seen = scorer_.sights(candidates_[i].pose);

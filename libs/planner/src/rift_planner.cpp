@@ -460,15 +460,13 @@ std::optional<ViewPlan> RiftPlanner::next(Knowledge& knowledge) {
     // A way that was too long for one step ended at another view than the one that promised.
     const double off = (knowledge.camera().translation - memory_.target).norm();
     if (off < knowledge.space().voxelSize()) {
-        memory_.update(knowledge.summary(), knowledge.options().minGain,
-                       knowledge.unseen().voxelSize());
+        memory_.update(knowledge.summary(), knowledge.options().minGain);
     }
     auto plan = Choice(knowledge, pool_, memory_).make();
     if (plan) {
         memory_.frontierGain = plan->unknownGain;
         memory_.tearGain = plan->tearGain;
         memory_.doubtGain = plan->coarseGain;
-        memory_.looked = plan->unknown;
         memory_.target = plan->path.back().translation;
     }
     return plan;

@@ -91,6 +91,11 @@ std::optional<Gap> gapBeside(const PixelGraph& graph, const SeenThrough& seen,
     constexpr double kStep = kPi / 12;
     std::optional<Gap> gap;
     for (const double distance : kDistances) {
+        // Straight on lies surface of the map, though it may be its other side.
+        if (graph.nearest((rim + distance * resolution * outward).cast<float>(),
+                          static_cast<float>(resolution))) {
+            break;
+        }
         bool free = false, unknown = false;
         std::optional<Eigen::Vector3d> dark;
         for (int i = 0; i <= kSteps && !unknown; ++i) {

@@ -94,6 +94,7 @@ SurfaceCell toCell(const Sums& s, std::uint64_t key, double cell) {
     c.position = (s.position / s.vertices).cast<float>();
     if (s.normal.norm() > 1e-6) {
         c.normal = s.normal.normalized().cast<float>();
+        c.oneSided = static_cast<float>(s.normal.norm() / s.vertices);
     }
     // A sheet across the cell holds about (cell / spacing)^2 vertices.
     const double spacing = cell / std::sqrt(static_cast<double>(s.vertices));

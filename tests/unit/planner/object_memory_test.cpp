@@ -35,7 +35,7 @@ TEST(PromiseKept, isAShareWhateverIsAskedFor) {
     kept.note(0, 0, 0);
     EXPECT_EQ(kept.share(), 1.0);
     ObjectMemory memory;
-    memory.update(SurfaceSummary(0.08, 0.02), 0, 0.05);  // before the first surface
+    memory.update(SurfaceSummary(0.08, 0.02), 0);  // before the first surface
     for (const PromiseKept* p : {&memory.frontier, &memory.tears, &memory.doubt}) {
         EXPECT_EQ(p->share(), 1.0);
     }
@@ -49,13 +49,11 @@ class Promises : public testing::Test {
         graph.merge(view);
         summary.update(graph, view);
         came = summary.newArea();
-        memory.looked = {place};
     }
-    void update() { memory.update(summary, 1e-4, 0.05); }
+    void update() { memory.update(summary, 1e-4); }
 
     PixelGraph graph{GraphOptions()};
     SurfaceSummary summary{4 * kResolution, kResolution};
-    const Eigen::Vector3d place{0.1, 0.1, 0.1};
     ObjectMemory memory;
     double came = 0;
 };
@@ -74,33 +72,12 @@ TEST_F(Promises, newAreaCountsForDoubtAsFarAsNothingElsePromisedIt) {
     EXPECT_NEAR(memory.doubt.share(), 1.0, 1e-6);
 }
 
-TEST_F(Promises, onlyAFrontierThatPromisedMostWasLookedAtInVain) {
+TEST_F(Promises, newAreaCountsForFrontierAndTearsInProportion) {
     memory.frontierGain = came;
     memory.tearGain = 4 * came;
     update();
-    EXPECT_EQ(memory.lookedInVain.left(place, 0.05), 1.0);
     EXPECT_NEAR(memory.frontier.share(), 0.2, 0.01);
-    memory.frontierGain = 4 * came;
-    memory.tearGain = 0;
-    update();
-    EXPECT_NEAR(memory.lookedInVain.left(place, 0.05), 0.3, 1e-9);
-}
-
-TEST(LookedInVain, takesWorthFromWhatLiesAroundInVainPlacesOnly) {
-    LookedInVain looked;
-    const Eigen::Vector3d place(0.03, -0.02, 0.5);
-    const double edge = 0.025;  // [m] of the frontier's voxels: cubes of 0.2 m
-    const auto left = [&](double dx) {
-        return looked.left(place + Eigen::Vector3d(dx, 0, 0), edge);
-    };
-    looked.note({place}, 0.6, edge);
-    EXPECT_EQ(left(0), 1.0);  // it brought enough
-    looked.note({place, place + Eigen::Vector3d(0.01, 0, 0)}, 0.4, edge);
-    EXPECT_DOUBLE_EQ(left(0), 0.4);  // once for a view, however many places
-    EXPECT_DOUBLE_EQ(left(0.1), 0.4);
-    EXPECT_EQ(left(0.3), 1.0);
-    looked.note({place}, 0.0, edge);
-    EXPECT_DOUBLE_EQ(left(0), 0.4 * 0.3);
+    EXPECT_NEAR(memory.tears.share(), 0.2, 0.01);
 }
 
 }  // namespace

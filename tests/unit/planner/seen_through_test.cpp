@@ -96,6 +96,12 @@ TEST_F(Plate, goesOnWhereNothingWasSeenAtAll) {
     EXPECT_LE(gap->place.x(), 1e-9);
 }
 
+TEST_F(Plate, hidesNothingWhereItsOtherSideIsKnown) {
+    see({2, 0.01, 0.02});
+    // As if the front had been seen up to the middle, and nothing through it.
+    EXPECT_FALSE(gapBeside(graph, SeenThrough{}, {0, 0, 0}, {-1, 0, 0}, {0, 1, 0}, kResolution));
+}
+
 TEST_F(Plate, beforeHalfOccludedPixelsNothingIsKnown) {
     View view = test::viewOf(lookAt({-2, 0, 0}, {0, 0, 0}), test::wall(0.0));
     PlatformLimits limits;

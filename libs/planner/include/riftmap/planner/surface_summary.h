@@ -19,6 +19,8 @@ struct SurfaceCell {
     std::uint64_t key = 0;  ///< names the cube; stays the same while the map grows
     Eigen::Vector3f position = Eigen::Vector3f::Zero();  ///< mean of the vertices
     Eigen::Vector3f normal = Eigen::Vector3f::Zero();    ///< mean, unit or zero
+    /// Length of the mean of the unit normals, 0 to 1: small where both sides of a sheet were seen.
+    float oneSided = 0;
     std::uint32_t vertices = 0;
     std::uint32_t open = 0;       ///< vertices that are not closed
     std::uint32_t highEdges = 0;  ///< at the open vertices, each counted at both ends

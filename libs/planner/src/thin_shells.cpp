@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "riftmap/planner/thin_shells.h"
+
+#include "riftmap/core/parallel.h"
+
+namespace riftmap {
+
+namespace {
+
+/// Offset of the i-th of a voxel and the 26 around it; the 13th is itself.
+Eigen::Vector3i around(int i) {
+    return {i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1};
+}
+
+constexpr int kAround = 27;
+
+}  // namespace
+
+ThinShells::ThinShells(const FreeSpace& space, const SurfaceSummary& summary,
+                       const std::vector<FreeSpace::Frontier>& frontier)
+    : origin_(space.box().min()), voxel_(space.voxelSize()) {
+    for (const auto& [key, block] : summary.blocks()) {
+        for (const SurfaceCell& cell : block.cells) {
+            Surface& s = surface_[keyOf(voxelOf(cell.position.cast<double>()))];
+            s.normals += static_cast<float>(cell.vertices) * cell.oneSided * cell.normal;
+            s.vertices += cell.vertices;
+        }
+    }
+    std::vector<Around> seen(frontier.size());
+    parallelForEach(frontier.size(), 16, [&](std::size_t i) {
+        const Eigen::Vector3d out = frontier[i].area.cast<double>().normalized();
+        seen[i] = lookAround(space, frontier[i].centre.cast<double>() + voxel_ * out);
+    });
+    std::unordered_map<std::uint64_t, std::size_t> left;  // of the frontier, by voxel
+    for (std::size_t i = 0; i < frontier.size(); ++i) {
+        left[keyOf(voxelOf(frontier[i].centre.cast<double>()))] = i;
+    }
+    constexpr int kLeast = 3;  // [backs] fewer may be a thin edge
+    for (const FreeSpace::Frontier& first : frontier) {
+        std::vector<Eigen::Vector3i> body;
+        Around all;
+        const auto take = [&](const Eigen::Vector3i& voxel) {
+            const auto it = left.find(keyOf(voxel));
+            if (it != left.end()) {
+                body.push_back(voxel);
+                all += seen[it->second];
+                left.erase(it);
+            }
+        };
+        take(voxelOf(first.centre.cast<double>()));
+        for (std::size_t k = 0; k < body.size(); ++k) {
+            for (int i = 0; i < kAround; ++i) {
+                take(body[k] + around(i));
+            }
+        }
+        if (all.backs >= kLeast && 2 * all.backs > all.all) {
+            for (const Eigen::Vector3i& voxel : body) {
+                inside_.insert(keyOf(voxel));
+            }
+        }
+    }
+}
+
+bool ThinShells::hold(const FreeSpace::Frontier& place) const {
+    return inside_.contains(keyOf(voxelOf(place.centre.cast<double>())));
+}
+
+bool ThinShells::touch(const Eigen::Vector3d& place) const {
+    for (int i = 0; i < kAround; ++i) {
+        if (inside_.contains(keyOf(voxelOf(place) + around(i)))) {
+            return true;
+        }
+    }
+    return false;
+}
+
+Eigen::Vector3i ThinShells::voxelOf(const Eigen::Vector3d& place) const {
+    return ((place - origin_) / voxel_).array().floor().cast<int>();
+}
+
+std::uint64_t ThinShells::keyOf(const Eigen::Vector3i& voxel) {
+    constexpr int kBits = 21;
+    constexpr std::uint64_t kMask = (std::uint64_t{1} << kBits) - 1;
+    const auto part = [](int i) { return static_cast<std::uint64_t>(i) & kMask; };
+    return part(voxel.z()) << 2 * kBits | part(voxel.y()) << kBits | part(voxel.x());
+}
+
+/// To the 26 sides, through the space that is known.
+ThinShells::Around ThinShells::lookAround(const FreeSpace& space,
+                                          const Eigen::Vector3d& place) const {
+    constexpr float kBothSides = 0.6F;  // of the mean normal's length; an edge of a solid has 0.7
+    constexpr float kBack = 0.2F;       // cosine
+    Around result;
+    for (int i = 0; i < kAround; ++i) {
+        const Eigen::Vector3d way = around(i).cast<double>().normalized();
+        if (way.isZero()) {
+            continue;
+        }
+        Eigen::Vector3d p = place;
+        while (space.box().contains(p) && space.at(p) == FreeSpace::State::kFree) {
+            p += 0.9 * voxel_ * way;
+        }
+        if (!space.box().contains(p)) {
+            ++result.all;
+        } else if (const auto it = surface_.find(keyOf(voxelOf(p))); it != surface_.end()) {
+            const Eigen::Vector3f mean =
+                it->second.normals / static_cast<float>(it->second.vertices);
+            const bool back =
+                mean.norm() < kBothSides || mean.dot(way.cast<float>()) > kBack * mean.norm();
+            result.backs += back ? 1 : 0;
+            ++result.all;
+        }
+    }
+    return result;
+}
+
+}  // namespace riftmap

@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "riftmap/planner/thin_shells.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "planner_scene.h"
+#include "riftmap/planner/view_planner.h"
+
+namespace riftmap {
+namespace {
+
+using Point = Eigen::Vector3d;
+
+/// Distance to the faces of a box without a lid, along a ray.
+void hitPot(const Eigen::AlignedBox3d& box, const Point& origin, const Point& ray,
+            std::optional<double>& nearest) {
+    for (int axis = 0; axis < 3; ++axis) {
+        for (const bool high : {false, true}) {
+            if (axis == 2 && high) {
+                continue;
+            }
+            const double plane = high ? box.max()[axis] : box.min()[axis];
+            const double t = (plane - origin[axis]) / ray[axis];
+            const Point p = origin + t * ray;
+            bool inside = t > 1e-9;
+            for (int other = 0; other < 3; ++other) {
+                inside = inside && (other == axis ||
+                                    (p[other] >= box.min()[other] && p[other] <= box.max()[other]));
+            }
+            if (inside && (!nearest || t < *nearest)) {
+                nearest = t;
+            }
+        }
+    }
+}
+
+/// A pot with walls of some thickness (0: none), seen from its four sides and then aslant from
+/// above, so that a part of its inside is not seen.
+class Pot {
+ public:
+    explicit Pot(double wall) : wall_(wall) {
+        for (const Point& eye : {Point(-1.5, 0, 0.1), Point(0, -1.5, 0.1), Point(1.5, 0, 0.1),
+                                 Point(0, 1.5, 0.1), Point(0, 0.05, -1.5), Point(-0.9, 0, 1.1)}) {
+            const View view = test::viewOf(
+                lookAt(eye, Point::Zero()),
+                [this](const Point& origin, const Point& ray) { return hit(origin, ray); });
+            graph_.merge(view);
+            knowledge_.update(view);
+        }
+    }
+    std::vector<FreeSpace::Frontier> frontier() const {
+        return knowledge_.unseen().frontier(*knowledge_.surfaceBox());
+    }
+    ThinShells shells() const { return {knowledge_.unseen(), knowledge_.summary(), frontier()}; }
+    bool isInside(const Point& p) const {
+        return std::max(std::abs(p.x()), std::abs(p.y())) < kHalf && p.z() > -kHalf;
+    }
+
+ private:
+    static constexpr double kHalf = 0.4;
+
+    std::optional<double> hit(const Point& origin, const Point& ray) const {
+        std::optional<double> nearest;
+        const Point half(kHalf, kHalf, kHalf);
+        hitPot({-half, half}, origin, ray, nearest);
+        if (wall_ > 0) {
+            const Point within(wall_, wall_, 0);
+            hitPot({-half + Point(wall_, wall_, wall_), half - within}, origin, ray, nearest);
+        }
+        return nearest;
+    }
+    static GraphOptions graphOptions() {
+        GraphOptions o;
+        o.targetResolution = 0.01;
+        return o;
+    }
+    static PlatformLimits limits() {
+        PlatformLimits limits;
+        limits.boxMin = Point(-2, -2, -2);
+        limits.boxMax = Point(2, 2, 2);
+        limits.farLimit = 6;
+        return limits;
+    }
+    static PlannerOptions options() {
+        PlannerOptions o;
+        o.surfaceBox = {-0.5, -0.5, -0.5, 0.5, 0.5, 0.5};
+        o.backgroundIsFree = true;
+        return o;
+    }
+
+    double wall_;
+    PixelGraph graph_{graphOptions()};
+    Knowledge knowledge_{graph_, limits(), options()};
+};
+
+TEST(ThinShells, holdTheInsideOfAPotWithWallsOfNoThickness) {
+    const Pot pot(0.0);
+    const ThinShells shells = pot.shells();
+    std::size_t held = 0;
+    std::size_t inside = 0;
+    for (const FreeSpace::Frontier& place : pot.frontier()) {
+        const bool in = pot.isInside(place.centre.cast<double>());
+        inside += in ? 1 : 0;
+        held += shells.hold(place) ? 1 : 0;
+        EXPECT_TRUE(in || !shells.hold(place)) << place.centre.transpose();
+        EXPECT_TRUE(!shells.hold(place) || shells.touch(place.centre.cast<double>()));
+    }
+    ASSERT_GT(inside, 100U) << "the test needs a part of the inside that was not seen";
+    EXPECT_GT(held, inside * 9 / 10);
+    EXPECT_FALSE(shells.touch({0, 0, 1}));
+}
+
+TEST(ThinShells, areNoneWhereWallsAreThick) {
+    const Pot pot(0.1);
+    const ThinShells shells = pot.shells();
+    std::size_t inside = 0;
+    for (const FreeSpace::Frontier& place : pot.frontier()) {
+        inside += pot.isInside(place.centre.cast<double>()) ? 1 : 0;
+        EXPECT_FALSE(shells.hold(place)) << place.centre.transpose();
+    }
+    ASSERT_GT(inside, 100U) << "the test needs a part of the inside that was not seen";
+}
+
+}  // namespace
+}  // namespace riftmap
