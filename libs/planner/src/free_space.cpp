@@ -201,7 +201,7 @@ Eigen::Vector3d FreeSpace::snap(const Eigen::Vector3d& point) const {
 void FreeSpace::declareFreeOutside(const Eigen::AlignedBox3d& surfaces) {
     for (std::size_t i = 0; i < voxels_.size(); ++i) {
         if (surfaces.exteriorDistance(centre(coordinates(i))) > 0.5 * voxel_) {
-            voxels_[i] |= kFreeBit | kKnownBit | kSeenBit | kMeasuredBit;
+            voxels_[i] |= kFreeBit | kKnownBit | kSeenBit | kProvenBit | kMiddleBit;
         }
     }
 }
@@ -227,7 +227,7 @@ bool FreeSpace::nothingTooNear(const View& view, const SensorModel& sensor, int 
     for (double s = sensor.clearance; s < end + stride; s += stride) {
         const Eigen::Vector3i v =
             voxelOf(view.world_T_camera.translation + std::min(s, end) * step);
-        if (!inside(v) || (voxels_[index(v)] & (kMeasuredBit | kSurfaceBit)) != kMeasuredBit) {
+        if (!inside(v) || (voxels_[index(v)] & (kProvenBit | kSurfaceBit)) != kProvenBit) {
             return false;
         }
     }
@@ -247,6 +247,7 @@ void FreeSpace::carve(const View& view, const SensorModel& sensor, bool backgrou
         });
     }
     const DepthRectangles depth(view, sensor, backgroundIsFree, empty);
+    const std::uint8_t done = sensor.exactDepth ? kProvenBit : kFreeBit;
     const StereoCamera& camera = view.camera;
     const Pose camera_T_world = view.world_T_camera.inverse();
     const double radius = 0.87 * voxel_;  // of the ball around a voxel
@@ -263,7 +264,7 @@ void FreeSpace::carve(const View& view, const SensorModel& sensor, bool backgrou
             Eigen::Vector3d p = first + begin * step;
             std::size_t i = index({begin, y, z});
             for (int x = begin; x < end; ++x, ++i, p += step) {
-                if (p.z() < radius || p.z() > sensor.farLimit || (voxels_[i] & kMeasuredBit) != 0) {
+                if (p.z() < radius || p.z() > sensor.farLimit || (voxels_[i] & done) != 0) {
                     continue;
                 }
                 const Eigen::Vector2d uv = camera.project(p);
@@ -284,7 +285,7 @@ void FreeSpace::carve(const View& view, const SensorModel& sensor, bool backgrou
                     view.disparity.valid(c, r) || empty[view.disparity.index(c, r)] != 0;
                 if ((measured || backgroundIsFree) &&
                     p.z() < static_cast<double>(at) + 0.5 * voxel_) {
-                    voxels_[i] |= kKnownBit;
+                    voxels_[i] |= measured ? kKnownBit | kMiddleBit : kKnownBit;
                     if (p.z() < static_cast<double>(at)) {
                         voxels_[i] |= kSeenBit;
                     }
@@ -296,9 +297,11 @@ void FreeSpace::carve(const View& view, const SensorModel& sensor, bool backgrou
                 const int b = std::max(r0, 0);
                 const int e = std::min(c1, width - 1);
                 const int f = std::min(r1, height - 1);
-                if (depth.measuredShare(a, b, e, f) >= kMeasured &&
+                const double share = depth.measuredShare(a, b, e, f);
+                if (share >= kMeasured &&
                     static_cast<double>(depth.least(a, b, e, f)) > p.z() + radius) {
-                    voxels_[i] |= kFreeBit | kMeasuredBit;
+                    const bool whole = a == c0 && b == r0 && e == c1 && f == r1;
+                    voxels_[i] |= whole && share == 1.0 ? kFreeBit | kProvenBit : kFreeBit;
                 }
             }
         }
@@ -367,7 +370,7 @@ void FreeSpace::updateClear(double clearance, const Eigen::AlignedBox3d& limits)
         blocking_.assign(voxels_.size(), 0);
         blockers_.assign(voxels_.size(), 0);
         allowed_.resize(voxels_.size());
-        fits_.assign(voxels_.size(), 0);
+        fits_.clear();
         for (std::size_t i = 0; i < voxels_.size(); ++i) {
             allowed_[i] = limits.contains(centre(coordinates(i))) ? 1 : 0;
         }
@@ -397,9 +400,11 @@ void FreeSpace::updateClear(double clearance, const Eigen::AlignedBox3d& limits)
     };
     for (const std::size_t i : changed) {
         const Eigen::Vector3i v = coordinates(i);
-        for (const Eigen::Vector3i& o : offsets) {
-            if (inside(v + o)) {
-                fits_[index(v + o)] = 0;
+        if (!fits_.empty()) {
+            for (const Eigen::Vector3i& o : offsets) {
+                if (inside(v + o)) {
+                    fits_[index(v + o)] = 0;
+                }
             }
         }
         recount(v);
@@ -420,7 +425,8 @@ void FreeSpace::forget(const Eigen::AlignedBox3d& changed) {
     if (fits_.empty()) {
         return;
     }
-    const Eigen::Vector3d reach = Eigen::Vector3d::Constant(clearance_ + voxel_);
+    // What `fits` looks at: the clearance and the dip between voxels, and what touches that.
+    const Eigen::Vector3d reach = Eigen::Vector3d::Constant(clearance_ + 3 * voxel_);
     const Eigen::Vector3i first = voxelOf(changed.min() - reach).cwiseMax(0);
     const Eigen::Vector3i last =
         voxelOf(changed.max() + reach).cwiseMin(size_ - Eigen::Vector3i::Ones());
@@ -523,7 +529,7 @@ bool FreeSpace::knownAround(const Eigen::Vector3d& point, double radius, bool co
                     (voxel & (kFreeBit | kSurfaceBit)) != 0) {
                     continue;
                 }
-                if ((voxel & kKnownBit) == 0 || !touchesSurface(v)) {
+                if ((voxel & (corners ? kMiddleBit : kKnownBit)) == 0 || !touchesSurface(v)) {
                     return false;
                 }
             }
@@ -559,6 +565,9 @@ std::size_t FreeSpace::updateReach(const Eigen::Vector3d& start, const Fits& fit
     const Eigen::Vector3i v = voxelOf(start);
     if (!inside(v)) {
         throw std::invalid_argument("free space: the camera is outside of the workspace");
+    }
+    if (fits) {
+        fits_.resize(voxels_.size(), 0);
     }
     searchFrom(v, fits);  // the camera is there, whatever is known of that voxel
     std::size_t reached = 0;

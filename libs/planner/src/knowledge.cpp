@@ -182,9 +182,12 @@ void Knowledge::updateReach() {
     space_.updateClear(clearance(), cameraBox_);
     anchor_ = camera_.translation;
     if (!space_.isClear(anchor_)) {
-        // Between voxels, where placeAt() let it go: ways begin at the clear one beside it.
+        // Between voxels, where placeAt() let it go, or in a passage: ways begin at a centre.
+        const Eigen::Vector3d own = space_.snap(anchor_);
         const auto beside = space_.nearestClear(anchor_, kBeside, false);
-        if (beside && fits(anchor_, *beside)) {
+        if (passages_ && fits(anchor_, own)) {
+            anchor_ = own;
+        } else if (beside && fits(anchor_, *beside)) {
             anchor_ = *beside;
         }
     }
@@ -192,19 +195,23 @@ void Knowledge::updateReach() {
     reached_ = space_.updateReach(anchor_, passages_ ? fits : FreeSpace::Fits());
 }
 
-bool Knowledge::openPassages() {
+bool Knowledge::openPassages(bool atTheEnd) {
     constexpr std::size_t kEvery = 20;  // [views] as a rule there are none, and a look takes time
     constexpr double kLeadOn = 1.02;    // less is a corner that voxels miss, and ways take longer
-    if (passages_ || views_ < nextLook_) {
+    if (passages_ || (views_ < nextLook_ && !atTheEnd)) {
         return false;
     }
     nextLook_ = views_ + kEvery;
     const std::size_t before = reached_;
     passages_ = true;
+    space_.forgetAll();
     updateReach();
     passages_ = static_cast<double>(reached_) > kLeadOn * static_cast<double>(before);
-    if (!passages_) {
+    if (passages_) {
+        ledger_.reopen(RiftState::kUnreachable);
+    } else {
         updateReach();
+        space_.forgetAll();
     }
     return passages_;
 }

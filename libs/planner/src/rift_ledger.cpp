@@ -130,6 +130,15 @@ void RiftLedger::giveUp(std::uint64_t key, RiftState state, const std::string& r
     }
 }
 
+void RiftLedger::reopen(RiftState state) {
+    for (auto& [key, r] : records_) {
+        if (r.state == state) {
+            r.state = RiftState::kOpen;
+            r.reason.clear();
+        }
+    }
+}
+
 void RiftLedger::deferOpen(const std::string& reason) {
     for (auto& [key, r] : records_) {
         if (r.state == RiftState::kOpen) {

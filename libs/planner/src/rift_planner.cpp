@@ -442,7 +442,7 @@ std::optional<ViewPlan> Choice::make() {
         return c.score.gain < minGain() || c.score.nearShare > 0.3;
     });
     const Candidate* b = best();
-    if ((b == nullptr || b->score.gain < 4 * minGain()) && k_.openPassages()) {
+    if ((b == nullptr || b->score.gain < 4 * minGain()) && k_.openPassages(false)) {
         return Choice(k_, pool_, memory_).make();
     }
     if (b != nullptr) {
@@ -455,7 +455,11 @@ std::optional<ViewPlan> Choice::make() {
 
 std::optional<ViewPlan> RiftPlanner::next(Knowledge& knowledge) {
     if (!knowledge.surfaceBox()) {
-        return Choice(knowledge, pool_, memory_).make();
+        auto plan = Choice(knowledge, pool_, memory_).make();
+        if (!plan && knowledge.openPassages(true)) {
+            plan = Choice(knowledge, pool_, memory_).make();
+        }
+        return plan;
     }
     // A way that was too long for one step ended at another view than the one that promised.
     const double off = (knowledge.camera().translation - memory_.target).norm();

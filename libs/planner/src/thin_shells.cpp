@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "riftmap/planner/thin_shells.h"
 
+#include <algorithm>
+#include <array>
+#include <optional>
+
 #include "riftmap/core/parallel.h"
 
 namespace riftmap {
@@ -13,6 +17,7 @@ Eigen::Vector3i around(int i) {
 }
 
 constexpr int kAround = 27;
+constexpr std::uint32_t kLeastVertices = 3;  // as in the free space: fewer may be noise
 
 }  // namespace
 
@@ -21,16 +26,17 @@ ThinShells::ThinShells(const FreeSpace& space, const SurfaceSummary& summary,
     : origin_(space.box().min()), voxel_(space.voxelSize()) {
     for (const auto& [key, block] : summary.blocks()) {
         for (const SurfaceCell& cell : block.cells) {
+            if (cell.vertices < kLeastVertices) {
+                continue;
+            }
             Surface& s = surface_[keyOf(voxelOf(cell.position.cast<double>()))];
             s.normals += static_cast<float>(cell.vertices) * cell.oneSided * cell.normal;
             s.vertices += cell.vertices;
         }
     }
     std::vector<Around> seen(frontier.size());
-    parallelForEach(frontier.size(), 16, [&](std::size_t i) {
-        const Eigen::Vector3d out = frontier[i].area.cast<double>().normalized();
-        seen[i] = lookAround(space, frontier[i].centre.cast<double>() + voxel_ * out);
-    });
+    parallelForEach(frontier.size(), 16,
+                    [&](std::size_t i) { seen[i] = lookAround(space, frontier[i]); });
     std::unordered_map<std::uint64_t, std::size_t> left;  // of the frontier, by voxel
     for (std::size_t i = 0; i < frontier.size(); ++i) {
         left[keyOf(voxelOf(frontier[i].centre.cast<double>()))] = i;
@@ -85,24 +91,40 @@ std::uint64_t ThinShells::keyOf(const Eigen::Vector3i& voxel) {
     return part(voxel.z()) << 2 * kBits | part(voxel.y()) << kBits | part(voxel.x());
 }
 
-/// To the 26 sides, through the space that is known.
+/// To the 26 sides, through the space that is known, from a free voxel before this one.
 ThinShells::Around ThinShells::lookAround(const FreeSpace& space,
-                                          const Eigen::Vector3d& place) const {
-    constexpr float kBothSides = 0.6F;  // of the mean normal's length; an edge of a solid has 0.7
-    constexpr float kBack = 0.2F;       // cosine
+                                          const FreeSpace::Frontier& place) const {
+    // Of the mean normal's length: the corner of a cube, seen from its three sides, has 0.58.
+    constexpr float kBothSides = 0.55F;
+    constexpr float kBack = 0.2F;  // cosine
+    std::optional<Eigen::Vector3d> start;
+    for (int axis = 0; axis < 3 && !start; ++axis) {
+        const auto area = static_cast<double>(place.area[axis]);
+        Eigen::Vector3d p = place.centre.cast<double>();
+        p[axis] += area > 0 ? voxel_ : -voxel_;
+        if (area != 0 && space.at(p) == FreeSpace::State::kFree) {
+            start = p;
+        }
+    }
     Around result;
-    for (int i = 0; i < kAround; ++i) {
+    std::array<std::uint64_t, kAround> met{};  // each piece of surface counts once
+    std::size_t pieces = 0;
+    for (int i = 0; i < kAround && start; ++i) {
         const Eigen::Vector3d way = around(i).cast<double>().normalized();
         if (way.isZero()) {
             continue;
         }
-        Eigen::Vector3d p = place;
+        Eigen::Vector3d p = *start;
         while (space.box().contains(p) && space.at(p) == FreeSpace::State::kFree) {
             p += 0.9 * voxel_ * way;
         }
+        const std::uint64_t key = keyOf(voxelOf(p));
+        const auto end = met.begin() + static_cast<std::ptrdiff_t>(pieces);
         if (!space.box().contains(p)) {
             ++result.all;
-        } else if (const auto it = surface_.find(keyOf(voxelOf(p))); it != surface_.end()) {
+        } else if (const auto it = surface_.find(key);
+                   it != surface_.end() && std::find(met.begin(), end, key) == end) {
+            met[pieces++] = key;
             const Eigen::Vector3f mean =
                 it->second.normals / static_cast<float>(it->second.vertices);
             const bool back =

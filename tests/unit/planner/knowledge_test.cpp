@@ -69,7 +69,7 @@ class Slit : public testing::Test {
 TEST_F(Slit, tooNarrowForVoxelsIsAPassageAllTheSame) {
     see(0.45);
     ASSERT_FALSE(knowledge.placeAt(behind)) << "the test needs a slit that voxels do not see";
-    EXPECT_TRUE(knowledge.openPassages());
+    EXPECT_TRUE(knowledge.openPassages(false));
     const auto place = knowledge.placeAt(behind);
     ASSERT_TRUE(place);
     Eigen::Vector3d at = knowledge.camera().translation;
@@ -80,15 +80,26 @@ TEST_F(Slit, tooNarrowForVoxelsIsAPassageAllTheSame) {
         }
         at = pose.translation;
     }
-    EXPECT_FALSE(knowledge.openPassages());  // they are open by now
+    EXPECT_FALSE(knowledge.openPassages(true));  // they are open by now
     knowledge.updateReach();
     EXPECT_TRUE(knowledge.placeAt(behind));
 }
 
-TEST_F(Slit, tooNarrowForTheCameraIsNone) {
-    see(0.22);
-    EXPECT_FALSE(knowledge.openPassages());
+TEST_F(Slit, tooNarrowForWaysBetweenVoxelsIsNone) {
+    see(0.27);  // wider than the clearance of 0.22 m, but the ways between two centres dip
+    const auto before = knowledge.space().reachable(1);
+    EXPECT_FALSE(knowledge.openPassages(false));
     EXPECT_FALSE(knowledge.placeAt(behind));
+    EXPECT_EQ(knowledge.space().reachable(1), before);
+}
+
+TEST_F(Slit, isLookedForNowAndThenAndAtTheEnd) {
+    see(0.27);
+    EXPECT_FALSE(knowledge.openPassages(false));
+    see(0.45);
+    EXPECT_FALSE(knowledge.openPassages(false));  // a look was just taken
+    EXPECT_TRUE(knowledge.openPassages(true));
+    EXPECT_TRUE(knowledge.placeAt(behind));
 }
 
 }  // namespace

@@ -126,6 +126,16 @@ TEST_F(LedgerOnWall, aTryThatHelpedIsNoAttempt) {
     EXPECT_TRUE(ledger.records().at(key).attempts.empty());
 }
 
+TEST_F(LedgerOnWall, whatWasUnreachableOpensAgainAndNothingElse) {
+    const std::uint64_t key = anyOpen();
+    ledger.giveUp(key, RiftState::kUnreachable, "no way there");
+    ledger.reopen(RiftState::kUnobservable);
+    EXPECT_EQ(ledger.records().at(key).state, RiftState::kUnreachable);
+    ledger.reopen(RiftState::kUnreachable);
+    EXPECT_EQ(ledger.records().at(key).state, RiftState::kOpen);
+    EXPECT_TRUE(ledger.records().at(key).reason.empty());
+}
+
 TEST_F(LedgerOnWall, whatIsOpenAtTheEndIsDeferred) {
     ledger.deferOpen("max_views");
     EXPECT_EQ(ledger.counts()[static_cast<std::size_t>(RiftState::kOpen)], 0U);

@@ -20,6 +20,7 @@ namespace riftmap {
 class FreeSpace {
  public:
     enum class State { kUnknown, kFree, kSurface };
+    /// Whether the camera fits at a place [m].
     using Fits = std::function<bool(const Eigen::Vector3d&)>;
 
     /// Covers `box`. Throws std::invalid_argument for an empty box, a voxel size that is not
@@ -75,20 +76,23 @@ class FreeSpace {
     void updateClear(double clearance, const Eigen::AlignedBox3d& limits);
     /// After updateClear(): which of those can be reached from `start`, straight from voxel centre
     /// to voxel centre, and how far that is. The start's own voxel counts as clear. `fits`, if
-    /// given: whether the camera fits at the centre of a voxel that is free but too near to others
-    /// for updateClear(), and on the straight ways to it; its answers are kept until forget().
+    /// given: asked of the centres of voxels that are free but too near to others for
+    /// updateClear(); it answers for the straight ways to the voxels around, too. Answers are kept
+    /// until forget() or until a voxel nearby becomes free: a "no" may live a little too long.
     /// Returns how many of the voxels reached are clear.
     std::size_t updateReach(const Eigen::Vector3d& start, const Fits& fits = {});
-    /// The surface within this box changed: `fits` is to be asked again.
+    /// The surface within this box changed: `fits` is to be asked again there.
     void forget(const Eigen::AlignedBox3d& changed);
+    /// `fits` is to be asked again everywhere.
+    void forgetAll() { fits_.clear(); }
     bool isClear(const Eigen::Vector3d& point) const {
         const Eigen::Vector3i v = voxelOf(point);
         return inside(v) && clear_[index(v)] != 0;
     }
     /// True if all that lies nearer than `radius` to this place was seen through, or is surface
     /// or cut by surface: then only the surface that is known has to be kept away from. A voxel is
-    /// cut whose middle was seen and that shares a face with one of surface, or with `corners` an
-    /// edge or a corner.
+    /// cut that is known and shares a face with one of surface, or with `corners` one before a
+    /// measured surface that shares a face, an edge or a corner.
     bool knownAround(const Eigen::Vector3d& point, double radius, bool corners) const;
     /// Centre of the nearest voxel, at most `reach` voxels away along each axis, that is clear (or
     /// with `reached` can be reached as well); nothing if there is none.
@@ -112,8 +116,11 @@ class FreeSpace {
                                                   ///< to look for surface; not enough to fly there
     static constexpr std::uint8_t kSurfaceBit = 4;
     static constexpr std::uint8_t kSeenBit = 8;  ///< the line of sight goes on behind its centre
-    static constexpr std::uint8_t kMeasuredBit = 16;  ///< free by a view, not as it was declared
-    static constexpr int kTryShift = 5;               ///< count of vain tries in the upper bits
+    /// No part of it was left out: declared free, or free by a view that has all of it in its image
+    /// and measured at every pixel.
+    static constexpr std::uint8_t kProvenBit = 16;
+    static constexpr std::uint8_t kMiddleBit = 32;  ///< known by what was measured at its centre
+    static constexpr int kTryShift = 6;             ///< count of vain tries in the upper bits
 
     bool inside(const Eigen::Vector3i& v) const {
         return (v.array() >= 0).all() && (v.array() < size_.array()).all();
@@ -135,7 +142,7 @@ class FreeSpace {
     /// Something not known to be free, beside what is.
     bool blocks(std::size_t voxel) const;
     /// Of pixels without a match: true if nothing lies nearer than the near limit, by `sensor`'s
-    /// clearance and by what was measured before.
+    /// clearance and by what was proven before.
     bool nothingTooNear(const View& view, const SensorModel& sensor, int column, int row) const;
     void searchFrom(const Eigen::Vector3i& start, const Fits& fits);
     bool fitsAt(std::size_t voxel, const Fits& fits);

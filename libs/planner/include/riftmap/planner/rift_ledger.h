@@ -58,6 +58,8 @@ class RiftLedger {
                const std::vector<float>& before, const Eigen::Vector3d& eye);
     /// Gives a cell up.
     void giveUp(std::uint64_t key, RiftState state, const std::string& reason);
+    /// What was given up in this state may be closed after all: it is open again.
+    void reopen(RiftState state);
     /// Ends the run: what is open becomes deferred.
     void deferOpen(const std::string& reason);
 

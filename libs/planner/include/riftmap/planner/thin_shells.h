@@ -17,11 +17,14 @@ namespace riftmap {
 /// opens up more unknown space. A body of frontier (voxels that touch) counts as the inside of one
 /// if, looking around from the free space before it, most of what stops the view is the back of
 /// known surface, or surface that was seen from both sides. Before the outside of a body, and in
-/// one with thick walls, it is the front. Map frame, metres. Thread-safe once it is made.
+/// one with thick walls, it is the front. Walls thinner than a voxel of the frontier (a cubic root
+/// of 10^-5 of the box, 2 cm for an object of 1 m) cannot be told from those of no thickness. Map
+/// frame, metres. Thread-safe once it is made.
 class ThinShells {
  public:
     /// `frontier`: all of `space`. `space` must know the surface of `summary`, and is not needed
-    /// afterwards. Time: in proportion to the frontier and to the cells.
+    /// afterwards. Time: in proportion to the cells, and to the frontier
+    /// times the edge of the space in voxels.
     ThinShells(const FreeSpace& space, const SurfaceSummary& summary,
                const std::vector<FreeSpace::Frontier>& frontier);
 
@@ -48,7 +51,7 @@ class ThinShells {
     };
     Eigen::Vector3i voxelOf(const Eigen::Vector3d& place) const;
     static std::uint64_t keyOf(const Eigen::Vector3i& voxel);
-    Around lookAround(const FreeSpace& space, const Eigen::Vector3d& place) const;
+    Around lookAround(const FreeSpace& space, const FreeSpace::Frontier& place) const;
 
     Eigen::Vector3d origin_;
     double voxel_;

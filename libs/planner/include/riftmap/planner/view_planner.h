@@ -55,10 +55,11 @@ class Knowledge {
     /// Ways from where the camera is.
     void updateReach();
     /// Looks for passages too narrow for voxels (a door, the space between a wall and the end of
-    /// the workspace), by the surface itself, and if they lead on, takes them into account from
-    /// then on. True if they do; false if they did before, if next to nothing lies behind them, or
-    /// if it was looked for less than 20 views ago.
-    bool openPassages();
+    /// the workspace), by the surface itself. If they lead on, to 2 % more voxels at least, takes
+    /// them into account from then on, and opens again the tears that were unreachable. True if
+    /// they do; false if they did before, or if the last look was less than 20 views ago and it is
+    /// not `atTheEnd`.
+    bool openPassages(bool atTheEnd);
     /// A place where the camera fits, and the way there.
     struct Place {
         Eigen::Vector3d eye;
