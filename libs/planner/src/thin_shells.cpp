@@ -41,7 +41,7 @@ ThinShells::ThinShells(const FreeSpace& space, const SurfaceSummary& summary,
     for (std::size_t i = 0; i < frontier.size(); ++i) {
         left[keyOf(voxelOf(frontier[i].centre.cast<double>()))] = i;
     }
-    constexpr int kLeast = 3;  // [backs] fewer may be a thin edge
+    constexpr int kLeast = 100;  // [backs] fewer may be a fold, and promise little
     for (const FreeSpace::Frontier& first : frontier) {
         std::vector<Eigen::Vector3i> body;
         Around all;

@@ -17,7 +17,8 @@ namespace riftmap {
 /// opens up more unknown space. A body of frontier (voxels that touch) counts as the inside of one
 /// if, looking around from the free space before it, most of what stops the view is the back of
 /// known surface, or surface that was seen from both sides. Before the outside of a body, and in
-/// one with thick walls, it is the front. Walls thinner than a voxel of the frontier (a cubic root
+/// one with thick walls, it is the front; bodies with fewer than 100 backs are not judged, for a
+/// fold of the surface may look like that. Walls thinner than a voxel of the frontier (a cubic root
 /// of 10^-5 of the box, 2 cm for an object of 1 m) cannot be told from those of no thickness. Map
 /// frame, metres. Thread-safe once it is made.
 class ThinShells {
