@@ -29,7 +29,7 @@ ThinShells::ThinShells(const FreeSpace& space, const SurfaceSummary& summary,
             if (cell.vertices < kLeastVertices) {
                 continue;
             }
-            Surface& s = surface_[keyOf(voxelOf(cell.position.cast<double>()))];
+            Surface& s = surface_[SurfaceSummary::keyAt(voxelOf(cell.position.cast<double>()))];
             s.normals += static_cast<float>(cell.vertices) * cell.oneSided * cell.normal;
             s.vertices += cell.vertices;
         }
@@ -39,14 +39,14 @@ ThinShells::ThinShells(const FreeSpace& space, const SurfaceSummary& summary,
                     [&](std::size_t i) { seen[i] = lookAround(space, frontier[i]); });
     std::unordered_map<std::uint64_t, std::size_t> left;  // of the frontier, by voxel
     for (std::size_t i = 0; i < frontier.size(); ++i) {
-        left[keyOf(voxelOf(frontier[i].centre.cast<double>()))] = i;
+        left[SurfaceSummary::keyAt(voxelOf(frontier[i].centre.cast<double>()))] = i;
     }
     constexpr int kLeast = 100;  // [backs] fewer may be a fold, and promise little
     for (const FreeSpace::Frontier& first : frontier) {
         std::vector<Eigen::Vector3i> body;
         Around all;
         const auto take = [&](const Eigen::Vector3i& voxel) {
-            const auto it = left.find(keyOf(voxel));
+            const auto it = left.find(SurfaceSummary::keyAt(voxel));
             if (it != left.end()) {
                 body.push_back(voxel);
                 all += seen[it->second];
@@ -61,19 +61,19 @@ ThinShells::ThinShells(const FreeSpace& space, const SurfaceSummary& summary,
         }
         if (all.backs >= kLeast && 2 * all.backs > all.all) {
             for (const Eigen::Vector3i& voxel : body) {
-                inside_.insert(keyOf(voxel));
+                inside_.insert(SurfaceSummary::keyAt(voxel));
             }
         }
     }
 }
 
 bool ThinShells::hold(const FreeSpace::Frontier& place) const {
-    return inside_.contains(keyOf(voxelOf(place.centre.cast<double>())));
+    return inside_.contains(SurfaceSummary::keyAt(voxelOf(place.centre.cast<double>())));
 }
 
 bool ThinShells::touch(const Eigen::Vector3d& place) const {
     for (int i = 0; i < kAround; ++i) {
-        if (inside_.contains(keyOf(voxelOf(place) + around(i)))) {
+        if (inside_.contains(SurfaceSummary::keyAt(voxelOf(place) + around(i)))) {
             return true;
         }
     }
@@ -82,13 +82,6 @@ bool ThinShells::touch(const Eigen::Vector3d& place) const {
 
 Eigen::Vector3i ThinShells::voxelOf(const Eigen::Vector3d& place) const {
     return ((place - origin_) / voxel_).array().floor().cast<int>();
-}
-
-std::uint64_t ThinShells::keyOf(const Eigen::Vector3i& voxel) {
-    constexpr int kBits = 21;
-    constexpr std::uint64_t kMask = (std::uint64_t{1} << kBits) - 1;
-    const auto part = [](int i) { return static_cast<std::uint64_t>(i) & kMask; };
-    return part(voxel.z()) << 2 * kBits | part(voxel.y()) << kBits | part(voxel.x());
 }
 
 /// To the 26 sides, through the space that is known, from a free voxel before this one.
@@ -118,7 +111,7 @@ ThinShells::Around ThinShells::lookAround(const FreeSpace& space,
         while (space.box().contains(p) && space.at(p) == FreeSpace::State::kFree) {
             p += 0.9 * voxel_ * way;
         }
-        const std::uint64_t key = keyOf(voxelOf(p));
+        const std::uint64_t key = SurfaceSummary::keyAt(voxelOf(p));
         const auto end = met.begin() + static_cast<std::ptrdiff_t>(pieces);
         if (!space.box().contains(p)) {
             ++result.all;

@@ -38,8 +38,9 @@ class FreeSpace {
     /// What a view saw through. `backgroundIsFree`: rays that met nothing within the range make
     /// voxels known (no surface to look for there), but not free to fly through: a surface nearer
     /// than the range has no match either. With `sensor.exactDepth` such a ray is measured as far
-    /// as the range goes if its part before the near limit is within the clearance or was measured
-    /// as free by earlier views.
+    /// as the range goes if its part before the near limit is within the clearance or in voxels
+    /// proven free: by declareFreeOutside(), or by earlier views that had the whole voxel in their
+    /// image, measured at every pixel.
     void carve(const View& view, const SensorModel& sensor, bool backgroundIsFree);
     /// Marks the voxels of these points as surface, and no others.
     void setSurface(const std::vector<Eigen::Vector3d>& points);

@@ -18,9 +18,9 @@ namespace riftmap {
 /// if, looking around from the free space before it, most of what stops the view is the back of
 /// known surface, or surface that was seen from both sides. Before the outside of a body, and in
 /// one with thick walls, it is the front; bodies with fewer than 100 backs are not judged, for a
-/// fold of the surface may look like that. Walls thinner than a voxel of the frontier (a cubic root
-/// of 10^-5 of the box, 2 cm for an object of 1 m) cannot be told from those of no thickness. Map
-/// frame, metres. Thread-safe once it is made.
+/// fold of the surface may look like that. Walls
+/// thinner than a voxel of the frontier (2.5 cm at a resolution of 5 mm, see Knowledge::unseen())
+/// cannot be told from those of no thickness. Map frame, metres. Thread-safe once it is made.
 class ThinShells {
  public:
     /// `frontier`: all of `space`. `space` must know the surface of `summary`, and is not needed
@@ -51,7 +51,6 @@ class ThinShells {
         }
     };
     Eigen::Vector3i voxelOf(const Eigen::Vector3d& place) const;
-    static std::uint64_t keyOf(const Eigen::Vector3i& voxel);
     Around lookAround(const FreeSpace& space, const FreeSpace::Frontier& place) const;
 
     Eigen::Vector3d origin_;
