@@ -385,13 +385,13 @@ std::vector<RiftRow> ExploreRun::certificate() const {
 void ExploreRun::writeCells() const {
     CsvWriter table(directory_.file("rift_cells.csv"),
                     {"rift", "state", "reason", "type", "x", "y", "z", "nx", "ny", "nz",
-                     "open_vertices", "edges", "attempts", "rim_m", "coarse_m2"});
+                     "open_vertices", "edges", "attempts", "rim_m", "coarse_m2", "hidden_m2"});
     for (const auto& [key, rift] : explorer_->rifts().owners()) {
         const RiftRecord& r = explorer_->knowledge().ledger().records().at(key);
         const SurfaceCell& c = r.cell;
         table.row({rift, nameOf(r.state), r.reason, kindNames(c.kinds), c.openPosition.x(),
                    c.openPosition.y(), c.openPosition.z(), c.normal.x(), c.normal.y(), c.normal.z(),
-                   c.open, c.highEdges, r.attempts.size(), c.rim, c.coarse});
+                   c.open, c.highEdges, r.attempts.size(), c.rim, c.coarse, c.hidden});
     }
 }
 

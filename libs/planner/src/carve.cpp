@@ -165,18 +165,23 @@ bool FreeSpace::nothingTooNear(const View& view, const SensorModel& sensor, int 
     return true;
 }
 
-void FreeSpace::carve(const View& view, const SensorModel& sensor, bool backgroundIsFree) {
-    std::vector<std::uint8_t> empty(view.disparity.disparity.size(), 0);
+std::vector<std::uint8_t> FreeSpace::emptyPixels(const View& view,
+                                                 const SensorModel& sensor) const {
+    const DisparityImage& d = view.disparity;
+    std::vector<std::uint8_t> empty(d.disparity.size(), 0);
     if (sensor.exactDepth) {
-        parallelForEach(view.disparity.height, 8, [&](int row) {
-            for (int column = view.disparity.firstColumn; column < view.disparity.width; ++column) {
-                empty[view.disparity.index(column, row)] =
-                    !view.disparity.valid(column, row) && nothingTooNear(view, sensor, column, row)
-                        ? 1
-                        : 0;
+        parallelForEach(d.height, 8, [&](int row) {
+            for (int column = d.firstColumn; column < d.width; ++column) {
+                empty[d.index(column, row)] =
+                    !d.valid(column, row) && nothingTooNear(view, sensor, column, row) ? 1 : 0;
             }
         });
     }
+    return empty;
+}
+
+void FreeSpace::carve(const View& view, const SensorModel& sensor,
+                      const std::vector<std::uint8_t>& empty, bool backgroundIsFree) {
     const DepthRectangles depth(view, sensor, backgroundIsFree, empty);
     const std::uint8_t done = sensor.exactDepth ? kProvenBit : kFreeBit;
     const StereoCamera& camera = view.camera;

@@ -157,7 +157,7 @@ std::optional<ViewPlan> Choice::makeAround(const Eigen::AlignedBox3d& box) {
     const double ball = box.sizes().mean() / 2 + k_.limits().clearance;
     TourOptions options;
     options.viewCost = k_.options().viewCost;
-    options.minGain = minGain();
+    options.minGain = k_.minGain();
     options.settled = 0.3 * k_.summary().area();
     const ViewTour tour = planTour(
         views, worth_,
@@ -171,7 +171,7 @@ std::optional<ViewPlan> Choice::makeAround(const Eigen::AlignedBox3d& box) {
         pool_.push_back(candidates_[tour.views[i]].pose);
     }
     if (tour.views.empty()) {
-        return lastResorts(minGain());
+        return lastResorts();
     }
     candidates_ = {Candidate(candidates_[tour.views.front()])};
     for (int round = 0; round < 2; ++round) {

@@ -17,14 +17,13 @@ void PromiseKept::note(double promised, double came, double least) {
 
 void ObjectMemory::update(const SurfaceSummary& summary, double minGain) {
     const double came = summary.newArea();
-    const double least = minGain * summary.area();
     const double ofNew = frontierGain + tearGain;
-    if (ofNew > 0 && ofNew >= 0.25 * least) {
+    if (ofNew > 0 && ofNew >= 0.25 * minGain) {
         // As they were promised, so they are taken to have come.
-        frontier.note(frontierGain / frontier.share(), came / ofNew * frontierGain, least);
-        tears.note(tearGain / tears.share(), came / ofNew * tearGain, least);
+        frontier.note(frontierGain / frontier.share(), came / ofNew * frontierGain, minGain);
+        tears.note(tearGain / tears.share(), came / ofNew * tearGain, minGain);
     }
-    doubt.note(doubtGain / doubt.share(), std::max(0.0, came - ofNew), least);
+    doubt.note(doubtGain / doubt.share(), std::max(0.0, came - ofNew), minGain);
 }
 
 }  // namespace riftmap

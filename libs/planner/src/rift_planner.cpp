@@ -267,10 +267,11 @@ bool Choice::lineOfSight(const Eigen::Vector3d& eye, const Eigen::Vector3d& targ
     return true;
 }
 
-/// The first place along a line out of a tear from where it can be seen: within the range, known to
-/// be reachable, not tried, and no vertex of the map within half the resolution of the line to it.
-std::optional<Eigen::Vector3d> Choice::lookOut(const RiftRecord& record,
-                                               const Eigen::Vector3d& out) const {
+/// The first place along a line out of a tear from where it can be seen: within the range, not
+/// tried, no vertex of the map within half the resolution of the line to it, and known to be
+/// reachable, or with `anywhere` no more than free.
+std::optional<Eigen::Vector3d> Choice::lookOut(const RiftRecord& record, const Eigen::Vector3d& out,
+                                               bool anywhere) const {
     const Eigen::Vector3d p = record.cell.openPosition.cast<double>();
     const double resolution = k_.resolution();
     const double nearest = 1.02 * k_.sensor().nearLimit;
@@ -283,7 +284,7 @@ std::optional<Eigen::Vector3d> Choice::lookOut(const RiftRecord& record,
         if (!free && k_.graph().nearest(at.cast<float>(), static_cast<float>(0.5 * resolution))) {
             return std::nullopt;
         }
-        if (s > nearest && std::isfinite(k_.space().distanceTo(at)) &&
+        if (s > nearest && (anywhere ? k_.mayBeAt(at) : std::isfinite(k_.space().distanceTo(at))) &&
             !RiftLedger::tried(record, at)) {
             return at;
         }
@@ -291,25 +292,45 @@ std::optional<Eigen::Vector3d> Choice::lookOut(const RiftRecord& record,
     return std::nullopt;
 }
 
-/// Views of a tear from where it can be seen, found by looking out of it to all sides.
-void Choice::addAllInSight(const RiftRecord& record, std::size_t most) {
+/// Calls f(eye) for places from where a tear can be seen, found by looking out of it to all sides,
+/// until f says false.
+template <class F>
+void Choice::forEachInSight(const RiftRecord& record, bool anywhere, const F& f) const {
     constexpr int kDirections = 400;
     constexpr double kFacing = 0.2;  // cosine: surface seen at a flatter angle is not measured well
-    const Eigen::Vector3d p = record.cell.openPosition.cast<double>();
     const bool step = (record.cell.kinds & kDepthStep) != 0;  // what it hides may face any way
-    const std::size_t wanted = candidates_.size() + most;
     const Eigen::Vector3d normal = record.cell.openNormal.cast<double>();
-    for (int k = 0; k < kDirections && candidates_.size() < wanted; ++k) {
+    for (int k = 0; k < kDirections; ++k) {
         const int i = k * 247 % kDirections;  // so that the first ones are from all sides, too
         const double z = 1 - (2 * i + 1.0) / kDirections;
         const double r = std::sqrt(1 - z * z);
         const Eigen::Vector3d out(r * std::cos(2.399963 * i), r * std::sin(2.399963 * i), z);
         if (step || normal.isZero() || out.dot(normal) > kFacing) {
-            if (const auto eye = lookOut(record, out)) {
-                add(*eye, p);
+            const auto eye = lookOut(record, out, anywhere);
+            if (eye && !f(*eye)) {
+                return;
             }
         }
     }
+}
+
+/// Views of a tear from where it can be seen.
+void Choice::addAllInSight(const RiftRecord& record, std::size_t most) {
+    const std::size_t wanted = candidates_.size() + most;
+    forEachInSight(record, false, [&](const Eigen::Vector3d& eye) {
+        add(eye, record.cell.openPosition.cast<double>());
+        return candidates_.size() < wanted;
+    });
+}
+
+/// Whether it can be seen from a free place that the camera may fit in, a way there known or not.
+bool Choice::mayBeSeen(const RiftRecord& record) const {
+    bool seen = false;
+    forEachInSight(record, true, [&](const Eigen::Vector3d&) {
+        seen = true;
+        return false;
+    });
+    return seen;
 }
 
 /// Whether the camera can be anywhere where this place is within its range.
@@ -326,7 +347,12 @@ bool Choice::inRange(const Eigen::Vector3d& place) {
 void Choice::giveUp(const RiftRecord& record, bool reachable, bool visible) {
     const std::uint64_t key = record.cell.key;
     const std::string tries = std::to_string(record.attempts.size());
-    if (!reachable) {
+    const bool untried = !reachable || (!visible && record.attempts.empty());
+    if (untried && mayBeSeen(record)) {
+        // The camera may fit there, so it must not be said that no view can close it.
+        k_.ledger().giveUp(key, RiftState::kBelowResolution,
+                           "seen only from where the voxels of free space are too coarse to lead");
+    } else if (!reachable) {
         k_.ledger().giveUp(key, RiftState::kUnreachable,
                            "no place within the range of it is known to be free");
     } else if (!visible && record.attempts.empty()) {
@@ -344,12 +370,13 @@ void Choice::giveUp(const RiftRecord& record, bool reachable, bool visible) {
 
 /// No candidate was worth it. Every tear that is left gets candidates of its own, from all sides;
 /// one that even these do not help is given up, with the reason.
-std::optional<ViewPlan> Choice::lastResorts(double minGain) {
+std::optional<ViewPlan> Choice::lastResorts() {
     std::vector<const RiftRecord*> left = scorer_.open();
     const double cell = k_.summary().cellSize();
     std::stable_sort(left.begin(), left.end(), [&](const RiftRecord* a, const RiftRecord* b) {
         return k_.ledger().tear(a->cell, cell) > k_.ledger().tear(b->cell, cell);
     });
+    const double minGain = k_.minGain();
     // Views that show a tear, were weighed, and are not worth it, made for it or for others.
     constexpr std::size_t kViews = 12;
     std::unordered_map<std::uint64_t, std::size_t> shown;
@@ -406,10 +433,6 @@ std::optional<ViewPlan> Choice::lastResorts(double minGain) {
     return std::nullopt;
 }
 
-double Choice::minGain() const {
-    return k_.options().minGain * k_.summary().area();
-}
-
 std::optional<ViewPlan> Choice::make() {
     const auto& open = scorer_.open();
     const auto targets = static_cast<std::size_t>(k_.options().targets);
@@ -439,10 +462,10 @@ std::optional<ViewPlan> Choice::make() {
     }
     keepPool();
     std::erase_if(candidates_, [&](const Candidate& c) {
-        return c.score.gain < minGain() || c.score.nearShare > 0.3;
+        return c.score.gain < k_.minGain() || c.score.nearShare > 0.3;
     });
     const Candidate* b = best();
-    if ((b == nullptr || b->score.gain < 4 * minGain()) && k_.openPassages(false)) {
+    if ((b == nullptr || b->score.gain < 4 * k_.minGain()) && k_.openPassages(false)) {
         return Choice(k_, pool_, memory_).make();
     }
     if (b != nullptr) {
@@ -450,7 +473,7 @@ std::optional<ViewPlan> Choice::make() {
             return plan;
         }
     }
-    return lastResorts(minGain());
+    return lastResorts();
 }
 
 std::optional<ViewPlan> RiftPlanner::next(Knowledge& knowledge) {
@@ -464,7 +487,7 @@ std::optional<ViewPlan> RiftPlanner::next(Knowledge& knowledge) {
     // A way that was too long for one step ended at another view than the one that promised.
     const double off = (knowledge.camera().translation - memory_.target).norm();
     if (off < knowledge.space().voxelSize()) {
-        memory_.update(knowledge.summary(), knowledge.options().minGain);
+        memory_.update(knowledge.summary(), knowledge.minGain());
     }
     auto plan = Choice(knowledge, pool_, memory_).make();
     if (plan) {

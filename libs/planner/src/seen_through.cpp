@@ -11,6 +11,8 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 constexpr float kSigmas = 2;
+constexpr double kNearest = 0.05;  // [m] before the camera
+constexpr int kTile = 32;  // [px] edge of the pieces of an image that are known by their farthest
 
 /// A row's pixels without a match before which nothing is, by their neighbours: the strip beside a
 /// step that one camera alone sees is as wide as the step in disparity, and a surface that is too
@@ -44,88 +46,169 @@ void openBackground(const DisparityImage& d, int row, float farLimit, std::vecto
 
 }  // namespace
 
-void SeenThrough::add(const View& view, const SensorModel& sensor, bool backgroundIsFree) {
+struct SeenThrough::Depths {
+    StereoCamera camera;
+    Pose camera_T_world;
+    std::vector<float> depth;     ///< up to which was seen through; 0: not known
+    std::vector<float> farthest;  ///< of each tile, row by row
+
+    int tileColumns() const { return (camera.width + kTile - 1) / kTile; }
+    void findFarthest();
+    bool reachInto(const Eigen::AlignedBox3d& box) const;
+};
+
+void SeenThrough::Depths::findFarthest() {
+    const int rows = (camera.height + kTile - 1) / kTile;
+    farthest.assign(static_cast<std::size_t>(rows * tileColumns()), 0.0F);
+    for (int row = 0; row < camera.height; ++row) {
+        for (int column = 0; column < camera.width; ++column) {
+            float& most =
+                farthest[static_cast<std::size_t>(row / kTile * tileColumns() + column / kTile)];
+            most = std::max(most, depth[static_cast<std::size_t>(row * camera.width + column)]);
+        }
+    }
+}
+
+/// By the ball around the box: false only if no place in it was seen through.
+bool SeenThrough::Depths::reachInto(const Eigen::AlignedBox3d& box) const {
+    const Eigen::Vector3d p = camera_T_world * Eigen::Vector3d(box.center());
+    const double radius = box.diagonal().norm() / 2;
+    const double front = p.z() - radius;
+    if (p.z() + radius < kNearest) {
+        return false;
+    }
+    if (front < kNearest) {
+        return true;
+    }
+    // A place at the ball's side projects between those of its front and its back.
+    const auto tiles = [&](double middle, double f, double c, int pixels) {
+        const double low = middle - radius;
+        const double high = middle + radius;
+        const double first = f * std::min(low / front, low / (p.z() + radius)) + c;
+        const double last = f * std::max(high / front, high / (p.z() + radius)) + c;
+        const double most = pixels - 1;
+        return first > most + 1 || last < -1
+                   ? std::pair(0, -1)
+                   : std::pair(static_cast<int>(std::clamp(first - 1, 0.0, most)) / kTile,
+                               static_cast<int>(std::clamp(last + 1, 0.0, most)) / kTile);
+    };
+    const auto [left, right] = tiles(p.x(), camera.fx, camera.cx, camera.width);
+    const auto [top, bottom] = tiles(p.y(), camera.fy, camera.cy, camera.height);
+    for (int row = top; row <= bottom; ++row) {
+        for (int column = left; column <= right; ++column) {
+            if (static_cast<double>(
+                    farthest[static_cast<std::size_t>(row * tileColumns() + column)]) > front) {
+                return true;
+            }
+        }
+    }
+    return false;
+}
+
+SeenThrough::SeenThrough() = default;
+SeenThrough::~SeenThrough() = default;
+
+void SeenThrough::add(const View& view, const SensorModel& sensor,
+                      const std::vector<std::uint8_t>& empty, bool backgroundIsFree) {
     const DisparityImage& d = view.disparity;
-    Depths depths{view.camera, view.world_T_camera.inverse(), {}};
+    Depths depths{view.camera, view.world_T_camera.inverse(), {}, {}};
     depths.depth.assign(d.disparity.size(), 0.0F);
+    const auto farLimit = static_cast<float>(sensor.farLimit);
     const double scale = view.camera.fx * view.camera.baseline;
     for (int row = 0; row < d.height; ++row) {
+        if (backgroundIsFree) {
+            openBackground(d, row, farLimit, depths.depth);
+        }
         for (int column = d.firstColumn; column < d.width; ++column) {
+            const std::size_t i = d.index(column, row);
             if (d.valid(column, row)) {
-                const std::size_t i = d.index(column, row);
                 const auto z =
                     static_cast<float>(view.camera.depth(static_cast<double>(d.disparity[i])));
                 const float sigma = z * z * d.sigma[i] / static_cast<float>(scale);
                 depths.depth[i] = z - kSigmas * sigma;
+            } else if (empty[i] != 0) {
+                depths.depth[i] = farLimit;
             }
         }
-        if (backgroundIsFree) {
-            openBackground(d, row, static_cast<float>(sensor.farLimit), depths.depth);
-        }
     }
+    depths.findFarthest();
     views_.push_back(std::move(depths));
 }
 
-bool SeenThrough::at(const Eigen::Vector3d& place) const {
+SeenThrough::Views SeenThrough::into(const Eigen::AlignedBox3d& box) const {
+    Views some;
+    std::for_each(views_.rbegin(), views_.rend(), [&](const Depths& v) {
+        if (v.reachInto(box)) {
+            some.depths_.push_back(&v);
+        }
+    });
+    return some;
+}
+
+SeenThrough::Views SeenThrough::all() const {
+    Views all;
+    std::for_each(views_.rbegin(), views_.rend(),
+                  [&](const Depths& v) { all.depths_.push_back(&v); });
+    return all;
+}
+
+bool SeenThrough::Views::seeThrough(const Eigen::Vector3d& place) const {
     // The newest view is the likeliest to know.
-    return std::any_of(views_.rbegin(), views_.rend(), [&](const Depths& v) {
-        const Eigen::Vector3d p = v.camera_T_world * place;
-        if (p.z() < 0.05) {
+    return std::any_of(depths_.begin(), depths_.end(), [&](const Depths* v) {
+        const Eigen::Vector3d p = v->camera_T_world * place;
+        if (p.z() < kNearest) {
             return false;
         }
-        const Eigen::Vector2d uv = v.camera.project(p);
+        const Eigen::Vector2d uv = v->camera.project(p);
         const auto column = static_cast<int>(std::lround(uv.x()));
         const auto row = static_cast<int>(std::lround(uv.y()));
-        return column >= 0 && row >= 0 && column < v.camera.width && row < v.camera.height &&
-               p.z() < static_cast<double>(v.depth[static_cast<std::size_t>(row) *
-                                                       static_cast<std::size_t>(v.camera.width) +
-                                                   static_cast<std::size_t>(column)]);
+        return column >= 0 && row >= 0 && column < v->camera.width && row < v->camera.height &&
+               p.z() < static_cast<double>(
+                           v->depth[static_cast<std::size_t>(row * v->camera.width + column)]);
     });
 }
 
-std::optional<Gap> gapBeside(const PixelGraph& graph, const SeenThrough& seen,
+std::optional<Gap> gapBeside(const PixelGraph& graph, const SeenThrough::Views& seen,
                              const Eigen::Vector3d& rim, const Eigen::Vector3d& normal,
                              const Eigen::Vector3d& outward, double resolution) {
-    constexpr std::array<double, 3> kDistances = {1.5, 2.5, 4.0};  // [resolutions]
-    constexpr int kSteps = 12;
+    constexpr std::array<double, 3> kDistances = {1.5, 2.5, 1 + kWidestGap};  // [resolutions]
     constexpr double kStep = kPi / 12;
+    constexpr int kFarthest = 7;  // [steps] from straight on: another surface may stand on the rim
+    const auto nearby = static_cast<float>(0.75 * resolution);
     std::optional<Gap> gap;
     for (const double distance : kDistances) {
-        // Straight on lies surface of the map, though it may be its other side.
-        if (graph.nearest((rim + distance * resolution * outward).cast<float>(),
-                          static_cast<float>(resolution))) {
+        const double radius = distance * resolution;
+        // Straight on the map has the surface's other side.
+        const auto ahead = graph.nearest((rim + radius * outward).cast<float>(), nearby);
+        if (ahead && graph.vertex(*ahead).normal.cast<double>().dot(normal) < -0.5) {
             break;
         }
-        bool free = false, unknown = false;
-        std::optional<Eigen::Vector3d> dark;
-        for (int i = 0; i <= kSteps && !unknown; ++i) {
-            const double angle = 5 * kStep - i * kStep;
+        bool free = false;
+        constexpr int kNone = kFarthest + 1;
+        int dark = kNone;  // step of the first unknown place
+        for (int step = kFarthest; step >= -kFarthest && !(free && dark != kNone); --step) {
             const Eigen::Vector3d place =
-                rim +
-                distance * resolution * (std::cos(angle) * outward + std::sin(angle) * normal);
-            if (seen.at(place)) {
+                rim + radius * (std::cos(step * kStep) * outward + std::sin(step * kStep) * normal);
+            if (seen.seeThrough(place)) {
                 free = true;
-            } else if (graph.nearest(place.cast<float>(), static_cast<float>(resolution))) {
+                dark = kNone;
+            } else if (graph.nearest(place.cast<float>(), nearby)) {
                 if (free) {
                     break;
                 }
-            } else if (free) {
-                unknown = true;
-                dark = place;
-            } else if (!dark && i >= 5) {
-                dark = place;
+            } else if (free || (dark == kNone && step <= 0)) {
+                dark = step;
             }
         }
-        unknown = unknown || (!free && dark);
-        if (unknown) {
-            if (!gap) {
-                gap = Gap{0, *dark};
-            }
-            gap->width = (distance - 1) * resolution;
-        }
-        if (!unknown) {
+        if (dark == kNone) {
             break;
         }
+        if (!gap) {
+            const double angle = dark * kStep;
+            gap = Gap{0, rim + radius * (std::cos(angle) * outward + std::sin(angle) * normal),
+                      std::cos(angle) * normal - std::min(std::sin(angle), 0.0) * outward};
+        }
+        gap->width = radius - resolution;
     }
     return gap;
 }

@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "riftmap/core/parallel.h"
+#include "riftmap/planner/seen_through.h"
 
 namespace riftmap {
 
@@ -35,6 +36,7 @@ struct Sums {
     Eigen::Vector3d tornNormal = Eigen::Vector3d::Zero(), coarseNormal = Eigen::Vector3d::Zero();
     double jump = 0, doubt = 0, hidden = 0;
     Eigen::Vector3d hiddenPosition = Eigen::Vector3d::Zero();
+    Eigen::Vector3d hiddenNormal = Eigen::Vector3d::Zero();
     std::uint32_t hides = 0;
     std::uint32_t vertices = 0, torn = 0, coarse = 0, open = 0, high = 0;
     std::uint8_t kinds = 0;
@@ -62,6 +64,30 @@ Eigen::Vector3d outwardAt(const PixelGraph& graph, VertexId id, const Vertex& v,
     sum -= n * n.dot(sum);
     const double length = sum.norm();
     return length > 1.0 ? Eigen::Vector3d(sum / length) : sum;
+}
+
+/// The gap beside a torn vertex; as wide as one may be where nothing tells in which direction.
+std::optional<Gap> gapAt(const PixelGraph& graph, const SeenThrough::Views& seen, const Vertex& v,
+                         const Eigen::Vector3d& outward, double resolution) {
+    const Eigen::Vector3d p = v.position.cast<double>();
+    const Eigen::Vector3d n = v.normal.cast<double>();
+    if (n.norm() < 0.5) {
+        return Gap{kWidestGap * resolution, p, Eigen::Vector3d::Zero()};
+    }
+    if (outward.norm() > 0.25) {
+        return gapBeside(graph, seen, p, n, outward.normalized(), resolution);
+    }
+    // Torn to opposite sides, as in surface seen at a flat angle.
+    const Eigen::Vector3d u = n.unitOrthogonal();
+    const Eigen::Vector3d w = n.cross(u);
+    std::optional<Gap> widest;
+    for (const Eigen::Vector3d& side : {u, Eigen::Vector3d(-u), w, Eigen::Vector3d(-w)}) {
+        const auto gap = gapBeside(graph, seen, p, n, side, resolution);
+        if (gap && (!widest || gap->width > widest->width)) {
+            widest = gap;
+        }
+    }
+    return widest;
 }
 
 /// Longest edge to a neighbour on the same surface [m].
@@ -115,6 +141,7 @@ SurfaceCell toCell(const Sums& s, std::uint64_t key, double cell) {
         c.hidden = static_cast<float>(s.hidden * spacing * most);
         if (s.hides > 0) {
             c.hiddenPosition = (s.hiddenPosition / s.hides).cast<float>();
+            c.hiddenNormal = (s.hiddenNormal / s.hides).cast<float>();
         }
     }
     return c;
@@ -303,6 +330,11 @@ SurfaceSummary::Block SurfaceSummary::build(const PixelGraph& graph, std::uint64
     const Eigen::Vector3i corner = unpack(blockKey) * n;
     const Eigen::Vector3d min = corner.cast<double>() * cell_;
     const Eigen::Vector3d max = min + Eigen::Vector3d::Constant(n * cell_);
+    const double beside = (kWidestGap + 2) * resolution_;  // where gaps are looked for
+    const Eigen::Vector3d margin = Eigen::Vector3d::Constant(beside);
+    const auto views = seen == nullptr
+                           ? SeenThrough::Views()
+                           : seen->into(Eigen::AlignedBox3d(min - margin, max + margin));
     std::vector<Sums> sums(std::size_t{n} * n * n);
     const auto sumsAt = [&](int x, int y, int z) -> Sums& {
         const std::ptrdiff_t i = (std::ptrdiff_t{z} * n + y) * n + x;
@@ -332,11 +364,11 @@ SurfaceSummary::Block SurfaceSummary::build(const PixelGraph& graph, std::uint64
             ++s.torn;
             const Eigen::Vector3d outward = outwardAt(graph, id, v, s);
             s.outward += outward;
-            if (seen != nullptr && outward.norm() > 0.25 && v.normal.norm() > 0.5F) {
-                if (const auto gap = gapBeside(graph, *seen, p, v.normal.cast<double>(),
-                                               outward.normalized(), resolution_)) {
+            if (seen != nullptr) {
+                if (const auto gap = gapAt(graph, views, v, outward, resolution_)) {
                     s.hidden += gap->width;
                     s.hiddenPosition += gap->place;
+                    s.hiddenNormal += gap->normal;
                     ++s.hides;
                 }
             }

@@ -50,16 +50,18 @@ class Choice {
     const Candidate* best() const;
     std::vector<Eigen::Vector3d> frontierSeen(const Pose& pose) const;
     std::optional<ViewPlan> planFor(const Candidate& candidate) const;
-    std::optional<Eigen::Vector3d> lookOut(const RiftRecord& record,
-                                           const Eigen::Vector3d& out) const;
+    std::optional<Eigen::Vector3d> lookOut(const RiftRecord& record, const Eigen::Vector3d& out,
+                                           bool anywhere) const;
+    template <class F>
+    void forEachInSight(const RiftRecord& record, bool anywhere, const F& f) const;
+    bool mayBeSeen(const RiftRecord& record) const;
     bool inRange(const Eigen::Vector3d& place);
     void addAllInSight(const RiftRecord& record, std::size_t most);
     void giveUp(const RiftRecord& record, bool reachable, bool visible);
-    std::optional<ViewPlan> lastResorts(double minGain);
+    std::optional<ViewPlan> lastResorts();
     bool lineOfSight(const Eigen::Vector3d& eye, const Eigen::Vector3d& target) const;
     std::optional<ViewPlan> makeAround(const Eigen::AlignedBox3d& box);
     void addPlacesAround(const Eigen::AlignedBox3d& box);
-    double minGain() const;
 
     Knowledge& k_;
     std::vector<Pose>& pool_;

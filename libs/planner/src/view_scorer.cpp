@@ -106,6 +106,12 @@ double ViewScorer::newSurfaceShare(double distance) const {
     return distance <= full ? 1.0 : std::pow(full / distance, 2);
 }
 
+/// What is uncovered along rims that seem to hide nothing, on average [m^2].
+double ViewScorer::besideRim(const SurfaceCell& cell) const {
+    constexpr double kWidth = 3e-4;  // [m]
+    return kWidth * static_cast<double>(cell.rim);
+}
+
 ViewScorer::Benefit ViewScorer::benefit(const RiftRecord& record,
                                         const Eigen::Vector3d& eye) const {
     if (RiftLedger::tried(record, eye)) {
@@ -113,10 +119,13 @@ ViewScorer::Benefit ViewScorer::benefit(const RiftRecord& record,
     }
     const Eigen::Vector3d ray = eye - record.cell.openPosition.cast<double>();
     const double distance = ray.norm();
-    // At a silhouette the surface bends away over the rim: what is to be seen faces outwards too,
-    // the more so if views from where the rim's own surface is seen well were in vain.
+    // What a gap hides faces as the gap does. At other silhouettes the surface bends away over the
+    // rim: what is to be seen faces outwards too, the more so if views from where the rim's own
+    // surface is seen well were in vain.
     Eigen::Vector3d facing = record.cell.openNormal.cast<double>();
-    if ((record.cell.kinds & kDepthStep) != 0) {
+    if (record.cell.hidden > 0) {
+        facing = record.cell.hiddenNormal.cast<double>();
+    } else if ((record.cell.kinds & kDepthStep) != 0) {
         const double over = 0.7 * (1.0 + static_cast<double>(record.attempts.size()));
         facing += over * record.cell.outward.cast<double>();
     }
@@ -124,17 +133,21 @@ ViewScorer::Benefit ViewScorer::benefit(const RiftRecord& record,
     if (facing.norm() > 1e-3) {
         angle = ray.dot(facing.normalized()) / distance;
     }
-    const double angleQuality = std::clamp((angle - 0.2) / 0.35, 0.0, 1.0);
+    // Exact depth is as good at flat angles; matching is not.
+    const double angleQuality = sensor_.exactDepth ? std::clamp((angle - 0.15) / 0.1, 0.0, 1.0)
+                                                   : std::clamp((angle - 0.2) / 0.35, 0.0, 1.0);
     // New surface is worth something from afar too; known surface gets better only from where the
     // view measures well.
     const double torn = newSurfaceShare(distance);
     const double coarse = std::clamp((1.6 * goodDepth_ - distance) / (0.6 * goodDepth_), 0.0, 1.0);
     const double vain = leftAfterTries(record);
     const double cell = summary_->cellSize();
-    // What a step hides is about as wide as the step is deep.
+    // What a gap hides goes on about as far beyond what was looked at as the step is deep.
     const double reach = std::clamp(0.5 * static_cast<double>(record.cell.jump),
                                     weights_.reach * cell, weights_.farthestReach * cell);
-    const double tornArea = static_cast<double>(record.cell.rim) * reach;
+    const double tornArea = weights_.hidden * static_cast<double>(record.cell.hidden) * reach /
+                                (kWidestGap * resolution_) +
+                            besideRim(record.cell);
     const double coarseArea = weights_.coarse * static_cast<double>(record.cell.coarse);
     Benefit result;
     result.coarseArea = angleQuality * vain * coarse * coarseArea;
@@ -215,7 +228,11 @@ void ViewScorer::forEachUnknown(const Pose& world_T_camera, const DepthBuffer& b
     }
 }
 
+/// Matching makes surface up where all is nearer than its range; exact depth only misses it.
 double ViewScorer::nearShareOf(const DepthBuffer& buffer) const {
+    if (sensor_.exactDepth) {
+        return 0;
+    }
     const int firstColumn = sensor_.firstColumn / kPixels;
     int nearPixels = 0;
     for (int row = 0; row < buffer.height; ++row) {
@@ -303,13 +320,11 @@ std::vector<Eigen::Vector3d> ViewScorer::unknownSeen(const Pose& world_T_camera)
 }
 
 std::vector<float> ViewScorer::worth() const {
-    // What is uncovered along rims that seem to hide nothing, on average.
-    constexpr float kBesideRim = 3e-4F;  // [m]
-    const auto hidden = static_cast<float>(weights_.hidden);
     std::vector<float> worth;
     worth.reserve(2 * (open_.size() + frontier_.size()));
     for (const RiftRecord* record : open_) {
-        worth.push_back(hidden * record->cell.hidden + kBesideRim * record->cell.rim);
+        worth.push_back(static_cast<float>(
+            weights_.hidden * static_cast<double>(record->cell.hidden) + besideRim(record->cell)));
         worth.push_back(static_cast<float>(weights_.doubt) * record->cell.doubt);
     }
     for (const FreeSpace::Frontier& f : frontier_) {

@@ -14,7 +14,10 @@ namespace riftmap {
 struct ChoiceTwin {
     static std::optional<Eigen::Vector3d> lookOut(const Choice& choice, const RiftRecord& record,
                                                   const Eigen::Vector3d& out) {
-        return choice.lookOut(record, out);
+        return choice.lookOut(record, out, false);
+    }
+    static bool mayBeSeen(const Choice& choice, const RiftRecord& record) {
+        return choice.mayBeSeen(record);
     }
     static std::vector<Candidate> allInSight(Choice& choice, const RiftRecord& record,
                                              std::size_t most) {
@@ -201,6 +204,7 @@ TEST_P(LookOutTwin, looksToAllSidesBeforeItSaysHidden) {
         }
         EXPECT_EQ(ChoiceTwin::allInSight(choice, *record, 5).size(),
                   std::min<std::size_t>(5, eyes.size()));
+        EXPECT_TRUE(eyes.empty() || ChoiceTwin::mayBeSeen(choice, *record));
         some += eyes.empty() ? 0 : 1;
     }
     EXPECT_GT(some, 2U);

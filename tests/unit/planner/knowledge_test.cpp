@@ -102,5 +102,27 @@ TEST_F(Slit, isLookedForNowAndThenAndAtTheEnd) {
     EXPECT_TRUE(knowledge.placeAt(behind));
 }
 
+TEST_F(Slit, theLeastGainFollowsTheDepthUnlessItIsGiven) {
+    see(0.5);
+    EXPECT_NEAR(knowledge.minGain(), 7e-4 * knowledge.summary().area(), 1e-12);
+    PlatformLimits exact = limits();
+    exact.exactDepth = true;
+    PlannerOptions given = options();
+    given.minGain = 0.01;
+    for (const auto& [o, share] : {std::pair(options(), 4e-4), std::pair(given, 0.01)}) {
+        Knowledge other(graph, exact, o);
+        other.update(test::viewOf(lookAt({0, 0, 0}, {1, 0, 0}), test::wall(1.2)));
+        EXPECT_NEAR(other.minGain(), share * other.summary().area(), 1e-12);
+    }
+}
+
+TEST_F(Slit, theCameraMayBeWhereNoWayLeads) {
+    see(0.21);
+    EXPECT_TRUE(knowledge.mayBeAt({1.6, 0, 0}));  // inside of it
+    EXPECT_FALSE(std::isfinite(knowledge.space().distanceTo({1.6, 0, 0})));
+    EXPECT_FALSE(knowledge.mayBeAt({1.6, 0, 0.1}));  // too near to its side
+    EXPECT_FALSE(knowledge.mayBeAt({5, 0, 0}));      // out of its box
+}
+
 }  // namespace
 }  // namespace riftmap

@@ -50,7 +50,7 @@ class Promises : public testing::Test {
         summary.update(graph, view);
         came = summary.newArea();
     }
-    void update() { memory.update(summary, 1e-4); }
+    void update() { memory.update(summary, 1e-4 * summary.area()); }
 
     PixelGraph graph{GraphOptions()};
     SurfaceSummary summary{4 * kResolution, kResolution};

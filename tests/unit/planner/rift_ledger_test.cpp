@@ -149,7 +149,7 @@ TEST_F(LedgerOnWall, viewsOverTheRimPromiseMoreThanTheOneTaken) {
     PlatformLimits limits;
     limits.farLimit = 6;
     const SensorModel sensor = SensorModel::of(view, limits);
-    space.carve(view, sensor, false);
+    space.carve(view, sensor, space.emptyPixels(view, sensor), false);
     const ViewScorer scorer(sensor, summary, ledger, space, 0.05, ViewScorer::Weights{0.5});
     const ViewScore same = scorer.score(lookAt({0, 0, 0}, {1, 0, 0}));
     const ViewScore beyond = scorer.score(lookAt({0, 1.2, 0}, {1, 1.2, 0}));
@@ -159,6 +159,57 @@ TEST_F(LedgerOnWall, viewsOverTheRimPromiseMoreThanTheOneTaken) {
     EXPECT_EQ(away.openGain, 0.0);
     const ViewScore tooNear = scorer.score(lookAt({1.9, 0, 0}, {3, 0, 0}));
     EXPECT_EQ(tooNear.openGain, 0.0);
+}
+
+/// One torn cell that faces smaller x, and hides `hiddenNormal`.
+class BenefitOfATear : public testing::Test {
+ protected:
+    BenefitOfATear() {
+        record.cell.openNormal = {-1, 0, 0};
+        record.cell.outward = {0, 0, 1};
+        record.cell.kinds = kNoMatch;
+        record.cell.rim = 0.08F;
+        record.cell.hidden = 0.004F;
+    }
+    double area(const Eigen::Vector3d& eye) {
+        PlatformLimits limits;
+        limits.farLimit = 6;
+        limits.exactDepth = exact;
+        const View view = test::viewOf(lookAt({0, 0, 0}, {1, 0, 0}), test::wall(2.0));
+        const ViewScorer scorer(SensorModel::of(view, limits), summary, ledger, space, 0.02,
+                                ViewScorer::Weights());
+        return scorer.benefit(record, eye).area;
+    }
+    RiftRecord record;
+    bool exact = false;
+
+ private:
+    SurfaceSummary summary{0.08, 0.02};
+    RiftLedger ledger{0.02, 4};
+    FreeSpace space{Eigen::AlignedBox3d(Eigen::Vector3d(-3, -3, -3), Eigen::Vector3d(3, 3, 3)),
+                    0.1};
+};
+
+TEST_F(BenefitOfATear, liesWhereTheHiddenSurfaceFaces) {
+    record.cell.hiddenNormal = {-1, 0, 0};
+    EXPECT_GT(area({-1, 0, 0}), 0.004);
+    record.cell.hiddenNormal = {0, 0, 1};  // the top of a wall
+    EXPECT_LT(area({-1, 0, 0}), 1e-6);
+    EXPECT_GT(area({-1, 0, 1}), 0.004);
+}
+
+TEST_F(BenefitOfATear, isNextToNothingWithoutAGap) {
+    record.cell.hidden = 0;
+    EXPECT_LT(area({-1, 0, 0}), 1e-4);
+    EXPECT_GT(area({-1, 0, 0}), 0.0);
+}
+
+TEST_F(BenefitOfATear, countsAtFlatAnglesWithExactDepthOnly) {
+    record.cell.hiddenNormal = {-1, 0, 0};
+    const Eigen::Vector3d flat(-0.27, 0.96, 0);
+    const double noisy = area(flat);
+    exact = true;
+    EXPECT_GT(area(flat), 3 * noisy);
 }
 
 }  // namespace

@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <random>
+#include <string>
 
 #include "planner_scene.h"
 #include "riftmap/planner/view_planner.h"
@@ -12,6 +14,10 @@ namespace riftmap {
 namespace {
 
 constexpr double kResolution = 0.02;
+
+std::vector<std::uint8_t> noneEmpty(const View& view) {
+    return std::vector<std::uint8_t>(view.disparity.disparity.size(), 0);
+}
 
 /// A box about the origin that stands alone, and what views of it tell.
 class Box : public testing::Test {
@@ -24,12 +30,12 @@ class Box : public testing::Test {
             [this](const Eigen::Vector3d& o, const Eigen::Vector3d& d) { return hit(o, d); });
         PlatformLimits limits;
         limits.farLimit = 6;
-        seen.add(view, SensorModel::of(view, limits), true);
+        seen.add(view, SensorModel::of(view, limits), noneEmpty(view), true);
         graph.merge(view);
     }
     std::optional<Gap> gapAt(const Eigen::Vector3d& rim, const Eigen::Vector3d& normal,
                              const Eigen::Vector3d& outward) const {
-        return gapBeside(graph, seen, rim, normal, outward, kResolution);
+        return gapBeside(graph, seen.all(), rim, normal, outward, kResolution);
     }
 
     static GraphOptions options() {
@@ -40,7 +46,6 @@ class Box : public testing::Test {
     PixelGraph graph{options()};
     SeenThrough seen;
 
- private:
     std::optional<double> hit(const Eigen::Vector3d& origin, const Eigen::Vector3d& ray) const {
         double near = 0, far = 100;
         for (int axis = 0; axis < 3; ++axis) {
@@ -51,6 +56,8 @@ class Box : public testing::Test {
         }
         return near < far && near > 0 ? std::optional(near) : std::nullopt;
     }
+
+ private:
     Eigen::Vector3d half_;
 };
 
@@ -61,12 +68,12 @@ class Plate : public Box {
 
 TEST_F(Box, knowsWhatLiesBeforeItsSurfaceAndBesideIt) {
     see({-2, 0.01, 0.02});
-    EXPECT_TRUE(seen.at({-0.3, 0, 0}));
-    EXPECT_TRUE(seen.at({0, 0.4, 0}));    // background
-    EXPECT_FALSE(seen.at({0, 0, 0}));     // inside
-    EXPECT_FALSE(seen.at({0.5, 0, 0}));   // behind
-    EXPECT_FALSE(seen.at({-1.5, 2, 0}));  // out of the image
-    EXPECT_FALSE(seen.at({-2.5, 0, 0}));  // behind the camera
+    EXPECT_TRUE(seen.all().seeThrough({-0.3, 0, 0}));
+    EXPECT_TRUE(seen.all().seeThrough({0, 0.4, 0}));    // background
+    EXPECT_FALSE(seen.all().seeThrough({0, 0, 0}));     // inside
+    EXPECT_FALSE(seen.all().seeThrough({0.5, 0, 0}));   // behind
+    EXPECT_FALSE(seen.all().seeThrough({-1.5, 2, 0}));  // out of the image
+    EXPECT_FALSE(seen.all().seeThrough({-2.5, 0, 0}));  // behind the camera
 }
 
 TEST_F(Box, itsSideMayBeHiddenUntilItIsSeen) {
@@ -76,6 +83,7 @@ TEST_F(Box, itsSideMayBeHiddenUntilItIsSeen) {
     ASSERT_TRUE(gap);
     EXPECT_NEAR(gap->width, 3 * kResolution, 1e-9);
     EXPECT_GT(gap->place.x(), -0.1);
+    EXPECT_GT(gap->normal.y(), 0.9);  // as the side faces
     see({0.01, 2, 0.02});
     EXPECT_FALSE(gapAt(rim, {-1, 0, 0}, {0, 1, 0}));  // the side's surface comes first
 }
@@ -90,7 +98,7 @@ TEST_F(Plate, thatWasSeenFromBothSidesEndsAtItsRim) {
 TEST_F(Plate, goesOnWhereNothingWasSeenAtAll) {
     see({-2, 0.01, 0.02});
     // As if the image had ended on the plate: beside it there is neither surface nor free space.
-    const auto gap = gapBeside(PixelGraph(options()), SeenThrough{}, {0, 0, 0}, {-1, 0, 0},
+    const auto gap = gapBeside(PixelGraph(options()), SeenThrough::Views{}, {0, 0, 0}, {-1, 0, 0},
                                {0, 1, 0}, kResolution);
     ASSERT_TRUE(gap);
     EXPECT_LE(gap->place.x(), 1e-9);
@@ -99,7 +107,84 @@ TEST_F(Plate, goesOnWhereNothingWasSeenAtAll) {
 TEST_F(Plate, hidesNothingWhereItsOtherSideIsKnown) {
     see({2, 0.01, 0.02});
     // As if the front had been seen up to the middle, and nothing through it.
-    EXPECT_FALSE(gapBeside(graph, SeenThrough{}, {0, 0, 0}, {-1, 0, 0}, {0, 1, 0}, kResolution));
+    EXPECT_FALSE(
+        gapBeside(graph, SeenThrough::Views{}, {0, 0, 0}, {-1, 0, 0}, {0, 1, 0}, kResolution));
+}
+
+TEST_F(Box, viewsIntoABoxAreAllThatSeeThroughAnythingInIt) {
+    constexpr std::uint32_t kSeed = 7;
+    SCOPED_TRACE("seed " + std::to_string(kSeed));
+    std::mt19937 random(kSeed);
+    const auto uniform = [&](double a, double b) {
+        return a + (b - a) * static_cast<double>(random()) / 4294967296.0;
+    };
+    for (int i = 0; i < 12; ++i) {
+        see(2 * Eigen::Vector3d(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1)).normalized());
+    }
+    std::size_t leftOut = 0;
+    std::size_t seenThrough = 0;
+    for (int i = 0; i < 2000; ++i) {
+        const Eigen::Vector3d corner(uniform(-3, 3), uniform(-3, 3), uniform(-3, 3));
+        const double edge = uniform(0.05, 0.6);
+        const auto views =
+            seen.into(Eigen::AlignedBox3d(corner, corner + Eigen::Vector3d::Constant(edge)));
+        leftOut += 12 - views.size();
+        for (int k = 0; k < 20; ++k) {
+            const Eigen::Vector3d place =
+                corner + edge * Eigen::Vector3d(uniform(0, 1), uniform(0, 1), uniform(0, 1));
+            ASSERT_EQ(views.seeThrough(place), seen.all().seeThrough(place)) << place.transpose();
+            seenThrough += seen.all().seeThrough(place) ? 1 : 0;
+        }
+    }
+    EXPECT_GT(leftOut, 2000U);
+    EXPECT_GT(seenThrough, 4000U);
+}
+
+/// A panel of 2.5 cm that stands on a wall; what is seen of them depends on the eye.
+class Panel : public Box {
+ protected:
+    Panel() : Box({0.0125, 0.3, 0.3}) {}
+    void lookAtTheWall(const Eigen::Vector3d& eye) {
+        const View view = test::viewOf(
+            lookAt(eye, Eigen::Vector3d(eye.x(), -0.3, eye.z())),
+            [this](const Eigen::Vector3d& o, const Eigen::Vector3d& d) -> std::optional<double> {
+                const auto panel = hit(o, d);
+                const double atWall = (-0.3 - o.y()) / d.y();
+                if (d.y() > -1e-9 || (panel && *panel < atWall)) {
+                    return panel;
+                }
+                return atWall;
+            });
+        PlatformLimits limits;
+        limits.farLimit = 6;
+        seen.add(view, SensorModel::of(view, limits), noneEmpty(view), true);
+        graph.merge(view);
+    }
+};
+
+TEST_F(Panel, isHiddenOnOneSideThoughTheOtherIsKnown) {
+    const Eigen::Vector3d besideThePanel(-0.015, -0.3, 0);
+    lookAtTheWall({0.8, 1.2, 0.01});    // its right side
+    lookAtTheWall({-0.013, 1.2, 0.0});  // straight along its left side
+    const auto gap = gapAt(besideThePanel, {0, 1, 0}, {1, 0, 0});
+    ASSERT_TRUE(gap);
+    lookAtTheWall({-0.8, 1.2, 0.01});
+    EXPECT_FALSE(gapAt(besideThePanel, {0, 1, 0}, {1, 0, 0}));
+}
+
+TEST_F(Box, pixelsProvenEmptyAreSeenThrough) {
+    const View view = test::viewOf(lookAt({-2, 0, 0}, {0, 0, 0}), [](const auto&, const auto&) {
+        return std::optional<double>();
+    });
+    PlatformLimits limits;
+    limits.farLimit = 6;
+    std::vector<std::uint8_t> empty = noneEmpty(view);
+    seen.add(view, SensorModel::of(view, limits), empty, false);
+    EXPECT_FALSE(seen.all().seeThrough({0, 0, 0}));
+    std::fill(empty.begin(), empty.end(), 1);
+    seen.add(view, SensorModel::of(view, limits), empty, false);
+    EXPECT_TRUE(seen.all().seeThrough({0, 0, 0}));
+    EXPECT_FALSE(seen.all().seeThrough({4.5, 0, 0}));  // beyond the range
 }
 
 TEST_F(Plate, beforeHalfOccludedPixelsNothingIsKnown) {
@@ -111,13 +196,13 @@ TEST_F(Plate, beforeHalfOccludedPixelsNothingIsKnown) {
             view.disparity.disparity[view.disparity.index(column, row)] = kNoDisparity;
         }
     }
-    seen.add(view, SensorModel::of(view, limits), true);
+    seen.add(view, SensorModel::of(view, limits), noneEmpty(view), true);
     const auto place = [&](int column) {  // halfway to the wall
         return Eigen::Vector3d(view.world_T_camera *
                                view.camera.backProject(column, 95, view.camera.disparity(1.0)));
     };
-    EXPECT_TRUE(seen.at(place(98)));
-    EXPECT_FALSE(seen.at(place(103)));
+    EXPECT_TRUE(seen.all().seeThrough(place(98)));
+    EXPECT_FALSE(seen.all().seeThrough(place(103)));
 }
 
 }  // namespace

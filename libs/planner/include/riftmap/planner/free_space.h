@@ -35,13 +35,18 @@ class FreeSpace {
     void declareFreeOutside(const Eigen::AlignedBox3d& surfaces);
     /// Free because the camera is there with its clearance.
     void declareFree(const Eigen::Vector3d& centre, double radius);
-    /// What a view saw through. `backgroundIsFree`: rays that met nothing within the range make
-    /// voxels known (no surface to look for there), but not free to fly through: a surface nearer
-    /// than the range has no match either. With `sensor.exactDepth` such a ray is measured as far
-    /// as the range goes if its part before the near limit is within the clearance or in voxels
-    /// proven free: by declareFreeOutside(), or by earlier views that had the whole voxel in their
-    /// image, measured at every pixel.
-    void carve(const View& view, const SensorModel& sensor, bool backgroundIsFree);
+    /// Pixels without a match before which nothing is, up to the far limit: 1 a pixel, for views
+    /// with `sensor.exactDepth`; else all 0. The part of the ray before the near limit, where
+    /// surface has no match either, is within the clearance or in voxels proven free: by
+    /// declareFreeOutside(), or by earlier views that had the whole voxel in their image, measured
+    /// at every pixel.
+    std::vector<std::uint8_t> emptyPixels(const View& view, const SensorModel& sensor) const;
+    /// What a view saw through; `empty` pixels count as measured, at the far limit.
+    /// `backgroundIsFree`: other rays that met nothing within the range make voxels known (no
+    /// surface to look for there), but not free to fly through: a surface nearer than the range has
+    /// no match either.
+    void carve(const View& view, const SensorModel& sensor, const std::vector<std::uint8_t>& empty,
+               bool backgroundIsFree);
     /// Marks the voxels of these points as surface, and no others.
     void setSurface(const std::vector<Eigen::Vector3d>& points);
     /// A piece of surface more, or one less that was added before: a voxel is surface while it

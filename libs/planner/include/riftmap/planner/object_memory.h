@@ -34,8 +34,8 @@ struct ObjectMemory {
     Eigen::Vector3d target = Eigen::Vector3d::Zero();      ///< where it was to be taken
     /// Holds the promises of the last view against the new area that it brought, to be called once
     /// after each SurfaceSummary::update(). New area counts for frontier and tears in proportion
-    /// to their promises; what goes beyond those counts for surface better known. `minGain`: share
-    /// of the summary's area that makes a view worth it, >= 0.
+    /// to their promises; what goes beyond those counts for surface better known. `minGain`:
+    /// what makes a view worth it [m^2], >= 0.
     void update(const SurfaceSummary& summary, double minGain);
 };
 

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -15,21 +17,39 @@ namespace riftmap {
 /// depth image a view (4 bytes a pixel). Map frame, metres. Reading is thread-safe while nothing
 /// writes.
 class SeenThrough {
+    struct Depths;
+
  public:
-    /// `backgroundIsFree`: what lies before pixels without a match was seen through, but for
-    /// pixels that one camera alone sees and those beside surface too near to be matched.
-    void add(const View& view, const SensorModel& sensor, bool backgroundIsFree);
-    /// True if some view measured only what lies behind this place, by two standard deviations.
-    /// Time grows with the number of views.
-    bool at(const Eigen::Vector3d& place) const;
-    std::size_t views() const { return views_.size(); }
+    SeenThrough();
+    ~SeenThrough();
+    SeenThrough(const SeenThrough&) = delete;
+    SeenThrough& operator=(const SeenThrough&) = delete;
+
+    /// `empty`: pixels without a match before which nothing is up to the far limit, from
+    /// FreeSpace::emptyPixels(). `backgroundIsFree`: what lies before other pixels without a match
+    /// was seen through, too, but for pixels that one camera alone sees and those beside surface
+    /// too near to be matched.
+    void add(const View& view, const SensorModel& sensor, const std::vector<std::uint8_t>& empty,
+             bool backgroundIsFree);
+
+    /// Some of the views; valid until the next add().
+    class Views {
+     public:
+        /// True if one of them measured only what lies behind this place, by two standard
+        /// deviations. Time grows with their number.
+        bool seeThrough(const Eigen::Vector3d& place) const;
+        std::size_t size() const { return depths_.size(); }
+
+     private:
+        friend class SeenThrough;
+        std::vector<const Depths*> depths_;  ///< the newest first
+    };
+    /// All that measured something within this box or behind it: whatever lies in it, the others
+    /// did not see through.
+    Views into(const Eigen::AlignedBox3d& box) const;
+    Views all() const;
 
  private:
-    struct Depths {
-        StereoCamera camera;
-        Pose camera_T_world;
-        std::vector<float> depth;  ///< up to which was seen through; 0: not known
-    };
     std::vector<Depths> views_;
 };
 
@@ -37,13 +57,19 @@ class SeenThrough {
 struct Gap {
     double width = 0;                                 ///< farther from the map than was asked [m]
     Eigen::Vector3d place = Eigen::Vector3d::Zero();  ///< the unknown place nearest to the rim
+    /// Of the surface if it runs from the rim to that place, towards the free side; zero if not
+    /// known.
+    Eigen::Vector3d normal = Eigen::Vector3d::Zero();
 };
+
+/// Width of a gap that goes on beyond the farthest place looked at [resolutions].
+inline constexpr double kWidestGap = 3;
 
 /// Walks around a rim at a few distances, from the side that the surface was seen from, over the
 /// rim, to its back: the surface that goes on there must come by. Where surface that is known
 /// comes first (within the resolution of the map) the tear is closed but for its edges; where all
 /// is seen through, the surface ends. `normal`, `outward`: unit vectors at the rim.
-std::optional<Gap> gapBeside(const PixelGraph& graph, const SeenThrough& seen,
+std::optional<Gap> gapBeside(const PixelGraph& graph, const SeenThrough::Views& seen,
                              const Eigen::Vector3d& rim, const Eigen::Vector3d& normal,
                              const Eigen::Vector3d& outward, double resolution);
 

@@ -39,6 +39,7 @@ struct SurfaceCell {
     /// [m^2].
     float hidden = 0;
     Eigen::Vector3f hiddenPosition = Eigen::Vector3f::Zero();  ///< mean of where it begins
+    Eigen::Vector3f hiddenNormal = Eigen::Vector3f::Zero();    ///< mean of Gap::normal
     float doubt = 0;  ///< part of it that is probably farther from the map than was asked [m^2]
     /// Which of the 4 x 4 x 4 parts of the cube hold a vertex: bit (z * 4 + y) * 4 + x.
     std::uint64_t parts = 0;

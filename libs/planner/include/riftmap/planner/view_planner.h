@@ -27,9 +27,9 @@ struct PlannerOptions {
     double cellSize = 0;    ///< of the surface summary [m]; 0 = 4 target resolutions
     double voxelSize = 0;   ///< of the free space [m]; 0 = by the workspace
     double viewCost = 4.0;  ///< what taking a view costs, in metres of path
-    double minGain =
-        5e-4;             ///< a view that adds less than this share of the surface is not worth it
-    int maxAttempts = 4;  ///< views of a tear that may fail before it is given up
+    double minGain = 0;     ///< a view that promises less than this share of the surface is not
+                            ///< worth it; 0: Knowledge::minGain()
+    int maxAttempts = 4;    ///< views of a tear that may fail before it is given up
     double unknownWeight = 0.5;     ///< of unknown space looked into, against tears to be closed
     double newSurfaceDepth = 1.5;   ///< good depths up to which new surface counts in full; 0: as
                                     ///< far as it is within the resolution of where it should be
@@ -91,6 +91,11 @@ class Knowledge {
     bool tiltAllowed(const Pose& pose) const;
     /// Box of the surfaces, if it was declared.
     const std::optional<Eigen::AlignedBox3d>& surfaceBox() const { return surfaceBox_; }
+    /// What a view has to promise to be worth it [m^2].
+    double minGain() const;
+    /// True if this place was seen through and no surface of the map is within the platform's
+    /// clearance, whether or not a way there is known. Thread-safe while nothing changes.
+    bool mayBeAt(const Eigen::Vector3d& place) const;
     double resolution() const { return graph_->options().targetResolution; }
     /// Poses from the camera to a reachable place, turning evenly on the way; the goal last.
     std::vector<Pose> pathTo(const Pose& goal) const;

@@ -18,11 +18,13 @@ namespace riftmap {
 
 /// What a view from some pose would bring.
 struct ViewScore {
-    double gain = 0;                   ///< surface that it may add or make better, about [m^2]
-    double openGain = 0;               ///< part of it: tears closed and surface known better
-    double coarseGain = 0;             ///< part of that: surface known better
-    double unknownGain = 0;            ///< part of it: unknown space looked into
-    double nearShare = 0;              ///< of the field of view that is nearer than the near limit
+    double gain = 0;         ///< surface that it may add or make better, about [m^2]
+    double openGain = 0;     ///< part of it: tears closed and surface known better
+    double coarseGain = 0;   ///< part of that: surface known better
+    double unknownGain = 0;  ///< part of it: unknown space looked into
+    /// Of the field of view that is nearer than the near limit; 0 with exact depth, which nothing
+    /// nearer disturbs.
+    double nearShare = 0;
     std::vector<std::uint64_t> cells;  ///< open cells that it sees well, ascending
 };
 
@@ -38,8 +40,8 @@ class ViewScorer {
         double reach = 1.5;  ///< width of the strip that closing a tear brings, in cells ...
         double farthestReach = 4.0;  ///< ... and beyond deep steps at most
         double coarse = 0.35;        ///< of surface known better against surface known at all
-        double hidden = 0.65;  ///< of what tears of an object may hide: the part that is there
-        double doubt = 1.0;    ///< of area of an object that is probably out of place, 0 to 1
+        double hidden = 1.5;  ///< of what tears may hide by their gaps: the part that is there
+        double doubt = 1.0;   ///< of area of an object that is probably out of place, 0 to 1
         double vain = 0.8;  ///< what is left of the worth of a tear after a view that did not help
         /// The same where pixels beside it had no disparity: what did not match once will hardly
         /// match from elsewhere, while what was hidden may be seen from another side.
@@ -82,7 +84,7 @@ class ViewScorer {
     std::vector<float> worth() const;
     struct Seen {
         std::vector<Sight> sights;
-        double nearShare = 0;  ///< of the field of view that is nearer than the near limit
+        double nearShare = 0;  ///< as in ViewScore
     };
     /// What a view would see of them. Surface known and unknown hides what lies behind it.
     /// Thread-safe.
@@ -115,6 +117,7 @@ class ViewScorer {
     void groupBlocks();
     DepthBuffer draw(const Pose& camera_T_world, std::vector<const BlockView*>& seen) const;
     double newSurfaceShare(double distance) const;
+    double besideRim(const SurfaceCell& cell) const;
     double nearShareOf(const DepthBuffer& buffer) const;
     bool visible(const DepthBuffer& buffer, const Eigen::Vector3f& inCamera, float slack) const;
     template <class F>
