@@ -59,8 +59,9 @@ void RiftLedger::updateCell(const SurfaceCell& cell, double cellSize) {
         return;
     }
     const bool exhausted = static_cast<int>(r.attempts.size()) >= maxAttempts_;
-    const bool givenUp =
-        r.state == RiftState::kUnreachable || r.state == RiftState::kUnobservable || exhausted;
+    const bool givenUp = r.state == RiftState::kUnreachable ||
+                         r.state == RiftState::kUnobservable || r.state == RiftState::kDeferred ||
+                         exhausted;
     if (!givenUp) {
         r.state = RiftState::kOpen;
         r.reason.clear();

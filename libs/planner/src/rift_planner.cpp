@@ -203,7 +203,7 @@ void Choice::refine(const Candidate& best) {
 
 void Choice::rate(Candidate& c, const ViewScore& score) const {
     c.score = score;
-    // What is too near is not measured, and hides what is behind it.
+    // Matching makes up surface where all is too near.
     const double gain = score.gain * std::max(0.0, 1.0 - 2.5 * score.nearShare);
     c.utility = gain / (k_.options().viewCost + c.path);
 }
@@ -298,7 +298,8 @@ template <class F>
 void Choice::forEachInSight(const RiftRecord& record, bool anywhere, const F& f) const {
     constexpr int kDirections = 400;
     constexpr double kFacing = 0.2;  // cosine: surface seen at a flatter angle is not measured well
-    const bool step = (record.cell.kinds & kDepthStep) != 0;  // what it hides may face any way
+    // What it hides may face any way.
+    const bool step = (record.cell.kinds & kDepthStep) != 0 || record.cell.hidden > 0;
     const Eigen::Vector3d normal = record.cell.openNormal.cast<double>();
     for (int k = 0; k < kDirections; ++k) {
         const int i = k * 247 % kDirections;  // so that the first ones are from all sides, too
@@ -325,10 +326,11 @@ void Choice::addAllInSight(const RiftRecord& record, std::size_t most) {
 
 /// Whether it can be seen from a free place that the camera may fit in, a way there known or not.
 bool Choice::mayBeSeen(const RiftRecord& record) const {
+    const Eigen::Vector3d p = record.cell.openPosition.cast<double>();
     bool seen = false;
-    forEachInSight(record, true, [&](const Eigen::Vector3d&) {
-        seen = true;
-        return false;
+    forEachInSight(record, true, [&](const Eigen::Vector3d& eye) {
+        seen = k_.tiltAllowed(k_.sensor().lookingAt(eye, p));
+        return !seen;
     });
     return seen;
 }
@@ -350,7 +352,7 @@ void Choice::giveUp(const RiftRecord& record, bool reachable, bool visible) {
     const bool untried = !reachable || (!visible && record.attempts.empty());
     if (untried && mayBeSeen(record)) {
         // The camera may fit there, so it must not be said that no view can close it.
-        k_.ledger().giveUp(key, RiftState::kBelowResolution,
+        k_.ledger().giveUp(key, RiftState::kDeferred,
                            "seen only from where the voxels of free space are too coarse to lead");
     } else if (!reachable) {
         k_.ledger().giveUp(key, RiftState::kUnreachable,

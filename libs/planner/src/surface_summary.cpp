@@ -66,13 +66,20 @@ Eigen::Vector3d outwardAt(const PixelGraph& graph, VertexId id, const Vertex& v,
     return length > 1.0 ? Eigen::Vector3d(sum / length) : sum;
 }
 
-/// The gap beside a torn vertex; as wide as one may be where nothing tells in which direction.
+/// The gap beside a torn vertex. Where no normal tells in which direction it may lie: as wide as
+/// one may be, unless all around was seen through.
 std::optional<Gap> gapAt(const PixelGraph& graph, const SeenThrough::Views& seen, const Vertex& v,
                          const Eigen::Vector3d& outward, double resolution) {
     const Eigen::Vector3d p = v.position.cast<double>();
     const Eigen::Vector3d n = v.normal.cast<double>();
     if (n.norm() < 0.5) {
-        return Gap{kWidestGap * resolution, p, Eigen::Vector3d::Zero()};
+        bool dark = false;
+        for (int i = 0; i < 6 && !dark; ++i) {
+            const Eigen::Vector3d side = (i < 3 ? 1.5 : -1.5) * Eigen::Vector3d::Unit(i % 3);
+            dark = !seen.seeThrough(p + resolution * side);
+        }
+        return dark ? std::optional(Gap{kWidestGap * resolution, p, Eigen::Vector3d::Zero()})
+                    : std::nullopt;
     }
     if (outward.norm() > 0.25) {
         return gapBeside(graph, seen, p, n, outward.normalized(), resolution);

@@ -119,23 +119,24 @@ ViewScorer::Benefit ViewScorer::benefit(const RiftRecord& record,
     }
     const Eigen::Vector3d ray = eye - record.cell.openPosition.cast<double>();
     const double distance = ray.norm();
+    const auto qualityOn = [&](const Eigen::Vector3d& facing) {
+        constexpr double kClear = 0.3;  // a shorter mean is of normals that cancel: any side may do
+        const double angle = facing.norm() > kClear ? ray.dot(facing.normalized()) / distance : 0.6;
+        // Exact depth is as good at flat angles; matching is not.
+        return sensor_.exactDepth ? std::clamp((angle - 0.15) / 0.1, 0.0, 1.0)
+                                  : std::clamp((angle - 0.2) / 0.35, 0.0, 1.0);
+    };
     // What a gap hides faces as the gap does. At other silhouettes the surface bends away over the
     // rim: what is to be seen faces outwards too, the more so if views from where the rim's own
     // surface is seen well were in vain.
     Eigen::Vector3d facing = record.cell.openNormal.cast<double>();
-    if (record.cell.hidden > 0) {
-        facing = record.cell.hiddenNormal.cast<double>();
-    } else if ((record.cell.kinds & kDepthStep) != 0) {
+    if ((record.cell.kinds & kDepthStep) != 0) {
         const double over = 0.7 * (1.0 + static_cast<double>(record.attempts.size()));
         facing += over * record.cell.outward.cast<double>();
     }
-    double angle = 0.6;  // where no normal is known, any side may do
-    if (facing.norm() > 1e-3) {
-        angle = ray.dot(facing.normalized()) / distance;
-    }
-    // Exact depth is as good at flat angles; matching is not.
-    const double angleQuality = sensor_.exactDepth ? std::clamp((angle - 0.15) / 0.1, 0.0, 1.0)
-                                                   : std::clamp((angle - 0.2) / 0.35, 0.0, 1.0);
+    const double coarseQuality = qualityOn(facing);
+    const double tornQuality =
+        record.cell.hidden > 0 ? qualityOn(record.cell.hiddenNormal.cast<double>()) : coarseQuality;
     // New surface is worth something from afar too; known surface gets better only from where the
     // view measures well.
     const double torn = newSurfaceShare(distance);
@@ -150,11 +151,11 @@ ViewScorer::Benefit ViewScorer::benefit(const RiftRecord& record,
                             besideRim(record.cell);
     const double coarseArea = weights_.coarse * static_cast<double>(record.cell.coarse);
     Benefit result;
-    result.coarseArea = angleQuality * vain * coarse * coarseArea;
-    result.area = angleQuality * vain * torn * tornArea + result.coarseArea;
-    result.quality = angleQuality * (tornArea > 0.3 * coarseArea ? torn : coarse);
-    result.torn = angleQuality * vain * torn;
-    result.coarse = angleQuality * vain * coarse;
+    result.coarseArea = coarseQuality * vain * coarse * coarseArea;
+    result.area = tornQuality * vain * torn * tornArea + result.coarseArea;
+    result.quality = tornArea > 0.3 * coarseArea ? tornQuality * torn : coarseQuality * coarse;
+    result.torn = tornQuality * vain * torn;
+    result.coarse = coarseQuality * vain * coarse;
     return result;
 }
 

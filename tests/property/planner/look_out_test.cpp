@@ -183,7 +183,8 @@ TEST_P(LookOutTwin, looksToAllSidesBeforeItSaysHidden) {
     for (const RiftRecord* record : someOpen()) {
         const Eigen::Vector3d p = record->cell.openPosition.cast<double>();
         const Eigen::Vector3d normal = record->cell.openNormal.cast<double>();
-        const bool anySide = (record->cell.kinds & kDepthStep) != 0 || normal.isZero();
+        const bool anySide =
+            (record->cell.kinds & kDepthStep) != 0 || record->cell.hidden > 0 || normal.isZero();
         std::vector<Eigen::Vector3d> eyes;
         for (int i = 0; i < 400; ++i) {  // evenly over the sphere, from its top to its bottom
             const double z = 1 - (2 * i + 1.0) / 400;

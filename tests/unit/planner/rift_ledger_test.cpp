@@ -136,6 +136,15 @@ TEST_F(LedgerOnWall, whatWasUnreachableOpensAgainAndNothingElse) {
     EXPECT_TRUE(ledger.records().at(key).reason.empty());
 }
 
+TEST_F(LedgerOnWall, whatWasDeferredStaysSoUntilItIsReopened) {
+    const std::uint64_t key = anyOpen();
+    ledger.giveUp(key, RiftState::kDeferred, "no way there");
+    ledger.update(summary);
+    EXPECT_EQ(ledger.records().at(key).state, RiftState::kDeferred);
+    ledger.reopen(RiftState::kDeferred);
+    EXPECT_EQ(ledger.records().at(key).state, RiftState::kOpen);
+}
+
 TEST_F(LedgerOnWall, whatIsOpenAtTheEndIsDeferred) {
     ledger.deferOpen("max_views");
     EXPECT_EQ(ledger.counts()[static_cast<std::size_t>(RiftState::kOpen)], 0U);
@@ -196,6 +205,14 @@ TEST_F(BenefitOfATear, liesWhereTheHiddenSurfaceFaces) {
     record.cell.hiddenNormal = {0, 0, 1};  // the top of a wall
     EXPECT_LT(area({-1, 0, 0}), 1e-6);
     EXPECT_GT(area({-1, 0, 1}), 0.004);
+    record.cell.hiddenNormal = {0, 0, 0.1F};  // two rims that face each other
+    EXPECT_GT(area({-1, 0, 0}), 0.004);
+}
+
+TEST_F(BenefitOfATear, leavesCoarseSurfaceItsOwnSide) {
+    record.cell.hiddenNormal = {0, 0, 1};
+    record.cell.coarse = 0.006F;
+    EXPECT_NEAR(area({-1, 0, 0}), 0.35 * 0.006, 2e-4);
 }
 
 TEST_F(BenefitOfATear, isNextToNothingWithoutAGap) {

@@ -16,7 +16,8 @@ namespace riftmap {
 /// What is to be said of a tear in the surface.
 enum class RiftState {
     kOpen,             ///< a view may close it
-    kDeferred,         ///< it may, but the run ended before (limits on views, metres, seconds)
+    kDeferred,         ///< it may, but the run ended before (limits on views, metres, seconds), or
+                       ///< no way is known to the free places that see it
     kUnreachable,      ///< no place known to be free lies within the range of it
     kUnobservable,     ///< hidden from every place that can be reached
     kBelowResolution,  ///< smaller than the surface was asked to be known, or too small to be worth

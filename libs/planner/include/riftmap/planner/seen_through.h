@@ -57,8 +57,8 @@ class SeenThrough {
 struct Gap {
     double width = 0;                                 ///< farther from the map than was asked [m]
     Eigen::Vector3d place = Eigen::Vector3d::Zero();  ///< the unknown place nearest to the rim
-    /// Of the surface if it runs from the rim to that place, towards the free side; zero if not
-    /// known.
+    /// How the surface faces if it runs from the rim to that place or, where that lies before the
+    /// rim's own plane, straight on; length at most 1, zero if not known.
     Eigen::Vector3d normal = Eigen::Vector3d::Zero();
 };
 

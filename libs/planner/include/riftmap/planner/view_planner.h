@@ -28,7 +28,7 @@ struct PlannerOptions {
     double voxelSize = 0;   ///< of the free space [m]; 0 = by the workspace
     double viewCost = 4.0;  ///< what taking a view costs, in metres of path
     double minGain = 0;     ///< a view that promises less than this share of the surface is not
-                            ///< worth it; 0: Knowledge::minGain()
+                            ///< worth it; 0: by the depth, see Knowledge::minGain()
     int maxAttempts = 4;    ///< views of a tear that may fail before it is given up
     double unknownWeight = 0.5;     ///< of unknown space looked into, against tears to be closed
     double newSurfaceDepth = 1.5;   ///< good depths up to which new surface counts in full; 0: as
@@ -55,7 +55,7 @@ class Knowledge {
     /// Ways from where the camera is.
     void updateReach();
     /// Looks for passages too narrow for voxels (a door, the space between a wall and the end of
-    /// the workspace), by the surface itself. If they lead on, to 2 % more voxels at least, takes
+    /// the workspace), by the surface itself. If they lead on, to 0.2 % more voxels at least, takes
     /// them into account from then on, and opens again the tears that were unreachable. True if
     /// they do; false if they did before, or if the last look was less than 20 views ago and it is
     /// not `atTheEnd`.
@@ -91,7 +91,8 @@ class Knowledge {
     bool tiltAllowed(const Pose& pose) const;
     /// Box of the surfaces, if it was declared.
     const std::optional<Eigen::AlignedBox3d>& surfaceBox() const { return surfaceBox_; }
-    /// What a view has to promise to be worth it [m^2].
+    /// What a view has to promise to be worth it [m^2]: PlannerOptions::minGain of the surface
+    /// known, or if that is 0 a share of 0.0007, with exact depth 0.0005.
     double minGain() const;
     /// True if this place was seen through and no surface of the map is within the platform's
     /// clearance, whether or not a way there is known. Thread-safe while nothing changes.
