@@ -145,6 +145,30 @@ std::optional<VertexId> PixelGraph::nearest(const Eigen::Vector3f& point, float 
     return found == kNoVertex ? std::nullopt : std::optional<VertexId>(found);
 }
 
+bool PixelGraph::anyWithin(const Eigen::Vector3f& point, float radius) const {
+    const Eigen::Vector3f reach = Eigen::Vector3f::Constant(radius);
+    const GraphStorage& s = storage();
+    const float limit = radius * radius;
+    const auto holds = [&](const Page& page) {
+        std::uint64_t near = 0;
+        for (std::uint32_t slot = 0; slot < Page::kSize; ++slot) {
+            const float dx = page.x[slot] - point.x();
+            const float dy = page.y[slot] - point.y();
+            const float dz = page.z[slot] - point.z();
+            near |= std::uint64_t{dx * dx + dy * dy + dz * dz < limit} << slot;
+        }
+        return (near & page.alive) != 0;
+    };
+    bool found = false;
+    s.forEachBlockIn(point - reach, point + reach, [&](std::uint32_t block) {
+        const auto& pages = s.blocks()[block].pages;
+        found = found || std::any_of(pages.begin(), pages.end(), [&](std::uint32_t index) {
+                    return s.bounds(index).squaredDistance(point) < limit && holds(s.page(index));
+                });
+    });
+    return found;
+}
+
 bool PixelGraph::isHigh(VertexId a, VertexId b, float weight) const {
     if (const std::uint16_t* code = storage().findHalfEdge(a, b)) {
         return (*code & compact::kHighBit) != 0;

@@ -20,9 +20,7 @@ constexpr float kFar = std::numeric_limits<float>::infinity();
 /// Depths of a view for questions about rectangles: least depth and share of measured pixels.
 class DepthRectangles {
  public:
-    /// `empty`: pixels without a match that are measured all the same, as nothing within the range.
-    DepthRectangles(const View& view, const SensorModel& sensor, bool backgroundIsFree,
-                    const std::vector<std::uint8_t>& empty)
+    DepthRectangles(const View& view, const EmptyPixels& empty)
         : width_(view.disparity.width), height_(view.disparity.height) {
         const auto n = static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_);
         std::vector<float> depth(n, kFar);
@@ -36,10 +34,10 @@ class DepthRectangles {
                 if (valid) {
                     depth[i] = static_cast<float>(
                         view.camera.depth(static_cast<double>(view.disparity.disparity[i])));
-                } else if (backgroundIsFree || empty[i] != 0) {
-                    depth[i] = static_cast<float>(sensor.farLimit);
+                } else if (empty.depth[i] > 0) {
+                    depth[i] = empty.depth[i];
                 }
-                inRow += valid || empty[i] != 0 ? 1 : 0;
+                inRow += valid || empty.proven[i] != 0 ? 1 : 0;
                 measured_[sum(column + 1, row + 1)] = measured_[sum(column + 1, row)] + inRow;
             }
         }
@@ -147,42 +145,8 @@ class ViewPyramid {
 
 }  // namespace
 
-bool FreeSpace::nothingTooNear(const View& view, const SensorModel& sensor, int column,
-                               int row) const {
-    const StereoCamera& c = view.camera;
-    const Eigen::Vector3d ray((column - c.cx) / c.fx, (row - c.cy) / c.fy, 1.0);
-    const double length = ray.norm();
-    const Eigen::Vector3d step = view.world_T_camera.rotation * ray / length;
-    const double end = sensor.nearLimit * length;
-    const double stride = 0.25 * voxel_;
-    for (double s = sensor.clearance; s < end + stride; s += stride) {
-        const Eigen::Vector3i v =
-            voxelOf(view.world_T_camera.translation + std::min(s, end) * step);
-        if (!inside(v) || (voxels_[index(v)] & (kProvenBit | kSurfaceBit)) != kProvenBit) {
-            return false;
-        }
-    }
-    return true;
-}
-
-std::vector<std::uint8_t> FreeSpace::emptyPixels(const View& view,
-                                                 const SensorModel& sensor) const {
-    const DisparityImage& d = view.disparity;
-    std::vector<std::uint8_t> empty(d.disparity.size(), 0);
-    if (sensor.exactDepth) {
-        parallelForEach(d.height, 8, [&](int row) {
-            for (int column = d.firstColumn; column < d.width; ++column) {
-                empty[d.index(column, row)] =
-                    !d.valid(column, row) && nothingTooNear(view, sensor, column, row) ? 1 : 0;
-            }
-        });
-    }
-    return empty;
-}
-
-void FreeSpace::carve(const View& view, const SensorModel& sensor,
-                      const std::vector<std::uint8_t>& empty, bool backgroundIsFree) {
-    const DepthRectangles depth(view, sensor, backgroundIsFree, empty);
+void FreeSpace::carve(const View& view, const SensorModel& sensor, const EmptyPixels& empty) {
+    const DepthRectangles depth(view, empty);
     const std::uint8_t done = sensor.exactDepth ? kProvenBit : kFreeBit;
     const StereoCamera& camera = view.camera;
     const Pose camera_T_world = view.world_T_camera.inverse();
@@ -217,9 +181,9 @@ void FreeSpace::carve(const View& view, const SensorModel& sensor,
                 // A voxel that the surface cuts is never free as a whole, and need not hold
                 // a vertex: it is known nevertheless.
                 const float at = depth.least(c, r, c, r);
-                const bool measured =
-                    view.disparity.valid(c, r) || empty[view.disparity.index(c, r)] != 0;
-                if ((measured || backgroundIsFree) &&
+                const std::size_t pixel = view.disparity.index(c, r);
+                const bool measured = view.disparity.valid(c, r) || empty.proven[pixel] != 0;
+                if ((measured || empty.depth[pixel] > 0) &&
                     p.z() < static_cast<double>(at) + 0.5 * voxel_) {
                     voxels_[i] |= measured ? kKnownBit | kMiddleBit : kKnownBit;
                     if (p.z() < static_cast<double>(at)) {

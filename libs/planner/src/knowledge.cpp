@@ -136,14 +136,14 @@ void Knowledge::update(const View& view) {
     ++views_;
     camera_ = view.world_T_camera;
     sensor_ = SensorModel::of(view, limits_);
-    const std::vector<std::uint8_t> empty = space_.emptyPixels(view, sensor_);
-    seenThrough_.add(view, sensor_, empty, options_.backgroundIsFree);
+    const EmptyPixels empty = space_.emptyPixels(view, sensor_, options_.backgroundIsFree);
+    seenThrough_.add(view, empty);
     summary_.update(*graph_, view, &seenThrough_);
     ledger_.update(summary_);
     // The camera is here with its clearance; two voxels more let it take the first step without
     // having looked straight up and down. Surface that is seen in them counts all the same.
     space_.declareFree(camera_.translation, limits_.clearance + 2.2 * space_.voxelSize());
-    space_.carve(view, sensor_, empty, options_.backgroundIsFree);
+    space_.carve(view, sensor_, empty);
     updateSurface(space_);
     for (std::size_t i = 0; i < summary_.changed().size(); ++i) {
         const auto it = summary_.blocks().find(summary_.changed()[i]);
@@ -153,7 +153,7 @@ void Knowledge::update(const View& view) {
         }
     }
     if (hull_) {
-        hull_->carve(view, sensor_, empty, options_.backgroundIsFree);
+        hull_->carve(view, sensor_, empty);
         updateSurface(*hull_);
     }
 }
@@ -223,7 +223,7 @@ bool Knowledge::fitsBetweenVoxels(const Eigen::Vector3d& centre) const {
     const double half = std::sqrt(0.75) * space_.voxelSize();
     const double radius = std::hypot(clearance(), half);
     return space_.knownAround(centre, radius, true) &&
-           !graph_->nearest(centre.cast<float>(), static_cast<float>(radius));
+           !graph_->anyWithin(centre.cast<float>(), static_cast<float>(radius));
 }
 
 /// True if the camera keeps its clearance on the straight way, by the surface itself.
@@ -234,7 +234,7 @@ bool Knowledge::fits(const Eigen::Vector3d& from, const Eigen::Vector3d& to) con
     for (int i = 0; i <= n; ++i) {
         const Eigen::Vector3d p = from + (to - from) * (static_cast<double>(i) / n);
         if (!cameraBox_.contains(p) || !space_.knownAround(p, clearance(), false) ||
-            graph_->nearest(p.cast<float>(), radius)) {
+            graph_->anyWithin(p.cast<float>(), radius)) {
             return false;
         }
     }
@@ -266,7 +266,7 @@ double Knowledge::minGain() const {
 
 bool Knowledge::mayBeAt(const Eigen::Vector3d& place) const {
     return cameraBox_.contains(place) && space_.at(place) == FreeSpace::State::kFree &&
-           !graph_->nearest(place.cast<float>(), static_cast<float>(limits_.clearance));
+           !graph_->anyWithin(place.cast<float>(), static_cast<float>(limits_.clearance));
 }
 
 bool Knowledge::tiltAllowed(const Pose& pose) const {

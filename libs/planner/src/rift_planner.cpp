@@ -281,7 +281,7 @@ std::optional<Eigen::Vector3d> Choice::lookOut(const RiftRecord& record, const E
         const Eigen::Vector3d at = p + s * out;
         const bool free = k_.space().at(at) == FreeSpace::State::kFree;
         step = free ? stride : resolution;
-        if (!free && k_.graph().nearest(at.cast<float>(), static_cast<float>(0.5 * resolution))) {
+        if (!free && k_.graph().anyWithin(at.cast<float>(), static_cast<float>(0.5 * resolution))) {
             return std::nullopt;
         }
         if (s > nearest && (anywhere ? k_.mayBeAt(at) : std::isfinite(k_.space().distanceTo(at))) &&

@@ -14,36 +14,6 @@ constexpr float kSigmas = 2;
 constexpr double kNearest = 0.05;  // [m] before the camera
 constexpr int kTile = 32;  // [px] edge of the pieces of an image that are known by their farthest
 
-/// A row's pixels without a match before which nothing is, by their neighbours: the strip beside a
-/// step that one camera alone sees is as wide as the step in disparity, and a surface that is too
-/// near has the greatest disparities beside it.
-void openBackground(const DisparityImage& d, int row, float farLimit, std::vector<float>& depth) {
-    constexpr float kWindow = 8;     // [px] that matching may add to such a strip
-    constexpr float kAlmost = 0.9F;  // of the greatest disparity
-    for (int begin = d.firstColumn; begin < d.width; ++begin) {
-        if (d.valid(begin, row)) {
-            continue;
-        }
-        int end = begin;
-        while (end < d.width && !d.valid(end, row)) {
-            ++end;
-        }
-        const float left = begin > d.firstColumn ? d.at(begin - 1, row) : 0.0F;
-        const float right = end < d.width ? d.at(end, row) : 0.0F;
-        const bool hole = begin > d.firstColumn && end < d.width;
-        const bool tooNear = std::max(left, right) > kAlmost * d.maxDisparity;
-        const bool oneSided =
-            hole && static_cast<float>(end - begin) <= std::abs(right - left) + kWindow;
-        if (!tooNear && !oneSided) {
-            std::fill(
-                depth.begin() + static_cast<std::ptrdiff_t>(d.index(begin, row)),
-                depth.begin() + static_cast<std::ptrdiff_t>(d.index(begin, row)) + end - begin,
-                farLimit);
-        }
-        begin = end;
-    }
-}
-
 }  // namespace
 
 struct SeenThrough::Depths {
@@ -108,17 +78,11 @@ bool SeenThrough::Depths::reachInto(const Eigen::AlignedBox3d& box) const {
 SeenThrough::SeenThrough() = default;
 SeenThrough::~SeenThrough() = default;
 
-void SeenThrough::add(const View& view, const SensorModel& sensor,
-                      const std::vector<std::uint8_t>& empty, bool backgroundIsFree) {
+void SeenThrough::add(const View& view, const EmptyPixels& empty) {
     const DisparityImage& d = view.disparity;
-    Depths depths{view.camera, view.world_T_camera.inverse(), {}, {}};
-    depths.depth.assign(d.disparity.size(), 0.0F);
-    const auto farLimit = static_cast<float>(sensor.farLimit);
+    Depths depths{view.camera, view.world_T_camera.inverse(), empty.depth, {}};
     const double scale = view.camera.fx * view.camera.baseline;
     for (int row = 0; row < d.height; ++row) {
-        if (backgroundIsFree) {
-            openBackground(d, row, farLimit, depths.depth);
-        }
         for (int column = d.firstColumn; column < d.width; ++column) {
             const std::size_t i = d.index(column, row);
             if (d.valid(column, row)) {
@@ -126,8 +90,6 @@ void SeenThrough::add(const View& view, const SensorModel& sensor,
                     static_cast<float>(view.camera.depth(static_cast<double>(d.disparity[i])));
                 const float sigma = z * z * d.sigma[i] / static_cast<float>(scale);
                 depths.depth[i] = z - kSigmas * sigma;
-            } else if (empty[i] != 0) {
-                depths.depth[i] = farLimit;
             }
         }
     }
@@ -143,13 +105,6 @@ SeenThrough::Views SeenThrough::into(const Eigen::AlignedBox3d& box) const {
         }
     });
     return some;
-}
-
-SeenThrough::Views SeenThrough::all() const {
-    Views all;
-    std::for_each(views_.rbegin(), views_.rend(),
-                  [&](const Depths& v) { all.depths_.push_back(&v); });
-    return all;
 }
 
 bool SeenThrough::Views::seeThrough(const Eigen::Vector3d& place) const {
@@ -178,11 +133,6 @@ std::optional<Gap> gapBeside(const PixelGraph& graph, const SeenThrough::Views& 
     std::optional<Gap> gap;
     for (const double distance : kDistances) {
         const double radius = distance * resolution;
-        // Straight on the map has the surface's other side.
-        const auto ahead = graph.nearest((rim + radius * outward).cast<float>(), nearby);
-        if (ahead && graph.vertex(*ahead).normal.cast<double>().dot(normal) < -0.5) {
-            break;
-        }
         bool free = false;
         constexpr int kNone = kFarthest + 1;
         int dark = kNone;  // step of the first unknown place
@@ -192,15 +142,20 @@ std::optional<Gap> gapBeside(const PixelGraph& graph, const SeenThrough::Views& 
             if (seen.seeThrough(place)) {
                 free = true;
                 dark = kNone;
-            } else if (graph.nearest(place.cast<float>(), nearby)) {
-                if (free) {
+            } else if (free || (dark == kNone && step <= 0)) {
+                if (!graph.anyWithin(place.cast<float>(), nearby)) {
+                    dark = step;
+                } else if (free) {
                     break;
                 }
-            } else if (free || (dark == kNone && step <= 0)) {
-                dark = step;
             }
         }
         if (dark == kNone) {
+            break;
+        }
+        // Straight on the map has the surface's other side.
+        const auto ahead = graph.nearest((rim + radius * outward).cast<float>(), nearby);
+        if (ahead && graph.vertex(*ahead).normal.cast<double>().dot(normal) < -0.5) {
             break;
         }
         if (!gap) {

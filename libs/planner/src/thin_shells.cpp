@@ -17,6 +17,7 @@ Eigen::Vector3i around(int i) {
 }
 
 constexpr int kAround = 27;
+constexpr int kPieceBits = 2;                ///< a piece of the frontier: 4 voxels along each axis
 constexpr std::uint32_t kLeastVertices = 3;  // as in the free space: fewer may be noise
 
 }  // namespace
@@ -37,32 +38,27 @@ ThinShells::ThinShells(const FreeSpace& space, const SurfaceSummary& summary,
     std::vector<Around> seen(frontier.size());
     parallelForEach(frontier.size(), 16,
                     [&](std::size_t i) { seen[i] = lookAround(space, frontier[i]); });
-    std::unordered_map<std::uint64_t, std::size_t> left;  // of the frontier, by voxel
+    // By pieces of the frontier and what lies around them: it may be one with what is unknown
+    // behind a hole that was not looked into yet.
+    const auto pieceOf = [&](const FreeSpace::Frontier& place) {
+        return Eigen::Vector3i(
+            voxelOf(place.centre.cast<double>()).unaryExpr([](int x) { return x >> kPieceBits; }));
+    };
+    std::unordered_map<std::uint64_t, Around> pieces;
     for (std::size_t i = 0; i < frontier.size(); ++i) {
-        left[SurfaceSummary::keyAt(voxelOf(frontier[i].centre.cast<double>()))] = i;
+        pieces[SurfaceSummary::keyAt(pieceOf(frontier[i]))] += seen[i];
     }
     constexpr int kLeast = 100;  // [backs] fewer may be a fold, and promise little
-    for (const FreeSpace::Frontier& first : frontier) {
-        std::vector<Eigen::Vector3i> body;
+    for (const FreeSpace::Frontier& place : frontier) {
         Around all;
-        const auto take = [&](const Eigen::Vector3i& voxel) {
-            const auto it = left.find(SurfaceSummary::keyAt(voxel));
-            if (it != left.end()) {
-                body.push_back(voxel);
-                all += seen[it->second];
-                left.erase(it);
-            }
-        };
-        take(voxelOf(first.centre.cast<double>()));
-        for (std::size_t k = 0; k < body.size(); ++k) {
-            for (int i = 0; i < kAround; ++i) {
-                take(body[k] + around(i));
+        for (int i = 0; i < kAround; ++i) {
+            const auto it = pieces.find(SurfaceSummary::keyAt(pieceOf(place) + around(i)));
+            if (it != pieces.end()) {
+                all += it->second;
             }
         }
         if (all.backs >= kLeast && 2 * all.backs > all.all) {
-            for (const Eigen::Vector3i& voxel : body) {
-                inside_.insert(SurfaceSummary::keyAt(voxel));
-            }
+            inside_.insert(SurfaceSummary::keyAt(voxelOf(place.centre.cast<double>())));
         }
     }
 }

@@ -30,7 +30,7 @@ struct Watched {
             summary.update(graph, view);
             ledger.update(summary);
             sensor = SensorModel::of(view, limits);
-            space.carve(view, sensor, space.emptyPixels(view, sensor), false);
+            space.carve(view, sensor, space.emptyPixels(view, sensor, false));
         }
     }
     ViewScorer scorer(const ViewScorer::Weights& weights = {0.5}) const {

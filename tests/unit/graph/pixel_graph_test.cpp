@@ -389,6 +389,7 @@ TEST(PixelGraph, NearestAndBoxAgreeWithBruteForce) {
             }
         });
         EXPECT_EQ(graph.nearest(p, radius), expected);
+        EXPECT_EQ(graph.anyWithin(p, radius), expected.has_value());
         std::set<VertexId> found;
         graph.forEachVertexIn(p - Eigen::Vector3f::Constant(0.1F),
                               p + Eigen::Vector3f::Constant(0.1F),

@@ -24,7 +24,7 @@ SensorModel sensorOf(const View& view) {
 TEST(FreeSpace, isFreeOnlyWhereAViewSawThrough) {
     FreeSpace space(kBox, 0.1);
     const View view = test::viewOf(lookAt({0, 0, 0}, {1, 0, 0}), test::wall(3.0));
-    space.carve(view, sensorOf(view), space.emptyPixels(view, sensorOf(view)), false);
+    space.carve(view, sensorOf(view), space.emptyPixels(view, sensorOf(view), false));
     EXPECT_EQ(space.at({1.5, 0, 0}), State::kFree);
     EXPECT_EQ(space.at({2.7, 0.5, 0.5}), State::kFree);
     EXPECT_EQ(space.at({3.5, 0, 0}), State::kUnknown);    // behind the wall
@@ -39,8 +39,8 @@ TEST(FreeSpace, theStripWithoutAPartnerIsNotSeen) {
     const Pose pose = lookAt({0, 0, 0}, {1, 0, 0});
     const View whole = test::viewOf(pose, test::wall(3.0));
     const View strip = test::viewOf(pose, test::wall(3.0), 60);
-    all.carve(whole, sensorOf(whole), all.emptyPixels(whole, sensorOf(whole)), false);
-    cut.carve(strip, sensorOf(strip), cut.emptyPixels(strip, sensorOf(strip)), false);
+    all.carve(whole, sensorOf(whole), all.emptyPixels(whole, sensorOf(whole), false));
+    cut.carve(strip, sensorOf(strip), cut.emptyPixels(strip, sensorOf(strip), false));
     const Eigen::Vector3d left(2.0, 0.9, 0.0);
     EXPECT_EQ(all.at(left), State::kFree);
     EXPECT_EQ(cut.at(left), State::kUnknown);
@@ -51,10 +51,10 @@ TEST(FreeSpace, pixelsWithoutAMatchAreKnownOnlyWhereTheBackgroundIsFree) {
         return std::optional<double>();
     });
     FreeSpace strict(kBox, 0.1);
-    strict.carve(view, sensorOf(view), strict.emptyPixels(view, sensorOf(view)), false);
+    strict.carve(view, sensorOf(view), strict.emptyPixels(view, sensorOf(view), false));
     EXPECT_EQ(strict.at({1.5, 0, 0}), State::kUnknown);
     FreeSpace open(kBox, 0.1);
-    open.carve(view, sensorOf(view), open.emptyPixels(view, sensorOf(view)), true);
+    open.carve(view, sensorOf(view), open.emptyPixels(view, sensorOf(view), true));
     EXPECT_EQ(open.at({1.5, 0, 0}), State::kFree);
     // Known, but not proven free to fly through.
     open.updateClear(0.0, kBox);
@@ -69,7 +69,7 @@ class Sky : public testing::Test {
         const View view = test::viewOf(lookAt({0, 0, 0}, {1, 0, 0}), [](const auto&, const auto&) {
             return std::optional<double>();
         });
-        space.carve(view, sensor, space.emptyPixels(view, sensor), false);
+        space.carve(view, sensor, space.emptyPixels(view, sensor, false));
     }
     /// A view across the first metre before the camera.
     void lookAcross() {
@@ -78,7 +78,7 @@ class Sky : public testing::Test {
             [](const Eigen::Vector3d& o, const Eigen::Vector3d& d) {
                 return d.y() > 1e-9 ? std::optional((1.5 - o.y()) / d.y()) : std::nullopt;
             });
-        space.carve(view, sensor, space.emptyPixels(view, sensor), false);
+        space.carve(view, sensor, space.emptyPixels(view, sensor, false));
     }
     bool canFlyTo(const Eigen::Vector3d& place) {
         space.updateClear(0.0, kBox);
@@ -129,7 +129,7 @@ TEST_F(Sky, isUnknownWhereAPixelMayHaveMissedWhatIsNear) {
     for (std::size_t i = 0; i < across.disparity.disparity.size(); i += 9) {
         across.disparity.disparity[i] = kNoDisparity;
     }
-    space.carve(across, sensor, space.emptyPixels(across, sensor), false);
+    space.carve(across, sensor, space.emptyPixels(across, sensor, false));
     EXPECT_TRUE(canFlyTo({0.5, 0.5, 0}));
     lookAhead();
     EXPECT_EQ(space.at(ahead), State::kUnknown);
@@ -203,7 +203,7 @@ TEST(FreeSpace, waysKeepTheClearance) {
 TEST(FreeSpace, besideKnownSurfaceOnlyTheSurfaceIsInTheWay) {
     FreeSpace space(kBox, 0.1);
     const View view = test::viewOf(lookAt({0, 0, 0}, {1, 0, 0}), test::wall(2.03));
-    space.carve(view, sensorOf(view), space.emptyPixels(view, sensorOf(view)), false);
+    space.carve(view, sensorOf(view), space.emptyPixels(view, sensorOf(view), false));
     const Eigen::Vector3d beside(1.8, 0, 0);
     EXPECT_TRUE(space.knownAround({1.2, 0, 0}, 0.2, false));
     EXPECT_FALSE(
@@ -230,7 +230,7 @@ TEST(FreeSpace, besideKnownSurfaceOnlyTheSurfaceIsInTheWay) {
 TEST(FreeSpace, theUnknownIsSeenThroughFreeSpaceOnly) {
     FreeSpace space(kBox, 0.1);
     const View view = test::viewOf(lookAt({0, 0, 0}, {1, 0, 0}), test::wall(2.0));
-    space.carve(view, sensorOf(view), space.emptyPixels(view, sensorOf(view)), false);
+    space.carve(view, sensorOf(view), space.emptyPixels(view, sensorOf(view), false));
     const Eigen::Vector3d eye(0.5, 0, 0);
     const auto run = space.firstUnknown(eye, Eigen::Vector3d::UnitX(), 3.0);
     const double s = run.begin;
@@ -328,7 +328,7 @@ TEST(FreeSpace, surfaceThatWasSeenHasNoFrontierBehindIt) {
     for (const double at : {3.03, 3.06}) {  // before and behind the middle of its voxels
         FreeSpace space(kBox, 0.1);
         const View view = test::viewOf(lookAt({0, 0, 0}, {1, 0, 0}), test::wall(at));
-        space.carve(view, sensorOf(view), space.emptyPixels(view, sensorOf(view)), false);
+        space.carve(view, sensorOf(view), space.emptyPixels(view, sensorOf(view), false));
         std::vector<Eigen::Vector3d> wall;
         for (double y = -1; y < 1; y += 0.02) {
             for (double z = -1; z < 1; z += 0.02) {
@@ -363,7 +363,7 @@ TEST(FreeSpace, whatIsClearDependsOnWhatIsKnownNotOnTheWayThere) {
         views.push_back(test::viewOf(lookAt(eye, eye + Eigen::Vector3d(1, uniform(-1, 1), 0)),
                                      test::wall(uniform(1.5, 3.5))));
         grown.carve(views.back(), sensorOf(views.back()),
-                    grown.emptyPixels(views.back(), sensorOf(views.back())), false);
+                    grown.emptyPixels(views.back(), sensorOf(views.back()), false));
         balls.emplace_back(place(), uniform(0.2, 0.6));
         grown.declareFree(balls.back().first, balls.back().second);
         for (int i = 0; i < 40; ++i) {
@@ -379,8 +379,8 @@ TEST(FreeSpace, whatIsClearDependsOnWhatIsKnownNotOnTheWayThere) {
     }
     FreeSpace atOnce(kBox, 0.1);
     for (std::size_t i = 0; i < views.size(); ++i) {
-        atOnce.carve(views[i], sensorOf(views[i]), atOnce.emptyPixels(views[i], sensorOf(views[i])),
-                     false);
+        atOnce.carve(views[i], sensorOf(views[i]),
+                     atOnce.emptyPixels(views[i], sensorOf(views[i]), false));
         atOnce.declareFree(balls[i].first, balls[i].second);
     }
     atOnce.setSurface(surface);
@@ -405,7 +405,7 @@ TEST(FreeSpace, carvingFindsEveryVoxelInView) {
     const Pose pose = lookAt({0.3, 0.2, -0.1}, {1.2, 0.9, 0.5});
     const View view = test::viewOf(pose, test::wall(3.03), 20);
     const SensorModel sensor = sensorOf(view);
-    space.carve(view, sensor, space.emptyPixels(view, sensor), false);
+    space.carve(view, sensor, space.emptyPixels(view, sensor, false));
     const double ball = 0.087;
     std::size_t found = 0;
     for (double x = -0.95; x < 4; x += 0.1) {

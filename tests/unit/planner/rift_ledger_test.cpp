@@ -158,7 +158,7 @@ TEST_F(LedgerOnWall, viewsOverTheRimPromiseMoreThanTheOneTaken) {
     PlatformLimits limits;
     limits.farLimit = 6;
     const SensorModel sensor = SensorModel::of(view, limits);
-    space.carve(view, sensor, space.emptyPixels(view, sensor), false);
+    space.carve(view, sensor, space.emptyPixels(view, sensor, false));
     const ViewScorer scorer(sensor, summary, ledger, space, 0.05, ViewScorer::Weights{0.5});
     const ViewScore same = scorer.score(lookAt({0, 0, 0}, {1, 0, 0}));
     const ViewScore beyond = scorer.score(lookAt({0, 1.2, 0}, {1, 1.2, 0}));

@@ -15,8 +15,21 @@ namespace {
 
 constexpr double kResolution = 0.02;
 
-std::vector<std::uint8_t> noneEmpty(const View& view) {
-    return std::vector<std::uint8_t>(view.disparity.disparity.size(), 0);
+SensorModel sensorOf(const View& view) {
+    PlatformLimits limits;
+    limits.farLimit = 6;
+    return SensorModel::of(view, limits);
+}
+
+/// With the background free.
+EmptyPixels emptyPixelsOf(const View& view) {
+    const Eigen::AlignedBox3d small(Eigen::Vector3d::Zero(), Eigen::Vector3d::Ones());
+    return FreeSpace(small, 0.1).emptyPixels(view, sensorOf(view), true);
+}
+
+SeenThrough::Views all(const SeenThrough& seen) {
+    const Eigen::Vector3d far = Eigen::Vector3d::Constant(100);
+    return seen.into(Eigen::AlignedBox3d(-far, far));
 }
 
 /// A box about the origin that stands alone, and what views of it tell.
@@ -28,14 +41,12 @@ class Box : public testing::Test {
         const View view = test::viewOf(
             lookAt(eye, Eigen::Vector3d::Zero()),
             [this](const Eigen::Vector3d& o, const Eigen::Vector3d& d) { return hit(o, d); });
-        PlatformLimits limits;
-        limits.farLimit = 6;
-        seen.add(view, SensorModel::of(view, limits), noneEmpty(view), true);
+        seen.add(view, emptyPixelsOf(view));
         graph.merge(view);
     }
     std::optional<Gap> gapAt(const Eigen::Vector3d& rim, const Eigen::Vector3d& normal,
                              const Eigen::Vector3d& outward) const {
-        return gapBeside(graph, seen.all(), rim, normal, outward, kResolution);
+        return gapBeside(graph, all(seen), rim, normal, outward, kResolution);
     }
 
     static GraphOptions options() {
@@ -68,12 +79,12 @@ class Plate : public Box {
 
 TEST_F(Box, knowsWhatLiesBeforeItsSurfaceAndBesideIt) {
     see({-2, 0.01, 0.02});
-    EXPECT_TRUE(seen.all().seeThrough({-0.3, 0, 0}));
-    EXPECT_TRUE(seen.all().seeThrough({0, 0.4, 0}));    // background
-    EXPECT_FALSE(seen.all().seeThrough({0, 0, 0}));     // inside
-    EXPECT_FALSE(seen.all().seeThrough({0.5, 0, 0}));   // behind
-    EXPECT_FALSE(seen.all().seeThrough({-1.5, 2, 0}));  // out of the image
-    EXPECT_FALSE(seen.all().seeThrough({-2.5, 0, 0}));  // behind the camera
+    EXPECT_TRUE(all(seen).seeThrough({-0.3, 0, 0}));
+    EXPECT_TRUE(all(seen).seeThrough({0, 0.4, 0}));    // background
+    EXPECT_FALSE(all(seen).seeThrough({0, 0, 0}));     // inside
+    EXPECT_FALSE(all(seen).seeThrough({0.5, 0, 0}));   // behind
+    EXPECT_FALSE(all(seen).seeThrough({-1.5, 2, 0}));  // out of the image
+    EXPECT_FALSE(all(seen).seeThrough({-2.5, 0, 0}));  // behind the camera
 }
 
 TEST_F(Box, itsSideMayBeHiddenUntilItIsSeen) {
@@ -132,8 +143,8 @@ TEST_F(Box, viewsIntoABoxAreAllThatSeeThroughAnythingInIt) {
         for (int k = 0; k < 20; ++k) {
             const Eigen::Vector3d place =
                 corner + edge * Eigen::Vector3d(uniform(0, 1), uniform(0, 1), uniform(0, 1));
-            ASSERT_EQ(views.seeThrough(place), seen.all().seeThrough(place)) << place.transpose();
-            seenThrough += seen.all().seeThrough(place) ? 1 : 0;
+            ASSERT_EQ(views.seeThrough(place), all(seen).seeThrough(place)) << place.transpose();
+            seenThrough += all(seen).seeThrough(place) ? 1 : 0;
         }
     }
     EXPECT_GT(leftOut, 2000U);
@@ -155,9 +166,7 @@ class Panel : public Box {
                 }
                 return atWall;
             });
-        PlatformLimits limits;
-        limits.farLimit = 6;
-        seen.add(view, SensorModel::of(view, limits), noneEmpty(view), true);
+        seen.add(view, emptyPixelsOf(view));
         graph.merge(view);
     }
 };
@@ -172,37 +181,33 @@ TEST_F(Panel, isHiddenOnOneSideThoughTheOtherIsKnown) {
     EXPECT_FALSE(gapAt(besideThePanel, {0, 1, 0}, {1, 0, 0}));
 }
 
-TEST_F(Box, pixelsProvenEmptyAreSeenThrough) {
+TEST_F(Box, emptyPixelsAreSeenThrough) {
     const View view = test::viewOf(lookAt({-2, 0, 0}, {0, 0, 0}), [](const auto&, const auto&) {
         return std::optional<double>();
     });
-    PlatformLimits limits;
-    limits.farLimit = 6;
-    std::vector<std::uint8_t> empty = noneEmpty(view);
-    seen.add(view, SensorModel::of(view, limits), empty, false);
-    EXPECT_FALSE(seen.all().seeThrough({0, 0, 0}));
-    std::fill(empty.begin(), empty.end(), 1);
-    seen.add(view, SensorModel::of(view, limits), empty, false);
-    EXPECT_TRUE(seen.all().seeThrough({0, 0, 0}));
-    EXPECT_FALSE(seen.all().seeThrough({4.5, 0, 0}));  // beyond the range
+    EmptyPixels empty{std::vector<float>(view.disparity.disparity.size(), 0.0F), {}};
+    seen.add(view, empty);
+    EXPECT_FALSE(all(seen).seeThrough({0, 0, 0}));
+    std::fill(empty.depth.begin(), empty.depth.end(), 6.0F);
+    seen.add(view, empty);
+    EXPECT_TRUE(all(seen).seeThrough({0, 0, 0}));
+    EXPECT_FALSE(all(seen).seeThrough({4.5, 0, 0}));  // beyond the range
 }
 
 TEST_F(Plate, beforeHalfOccludedPixelsNothingIsKnown) {
     View view = test::viewOf(lookAt({-2, 0, 0}, {0, 0, 0}), test::wall(0.0));
-    PlatformLimits limits;
-    limits.farLimit = 6;
     for (int row = 90; row < 100; ++row) {
         for (int column = 100; column < 106; ++column) {
             view.disparity.disparity[view.disparity.index(column, row)] = kNoDisparity;
         }
     }
-    seen.add(view, SensorModel::of(view, limits), noneEmpty(view), true);
+    seen.add(view, emptyPixelsOf(view));
     const auto place = [&](int column) {  // halfway to the wall
         return Eigen::Vector3d(view.world_T_camera *
                                view.camera.backProject(column, 95, view.camera.disparity(1.0)));
     };
-    EXPECT_TRUE(seen.all().seeThrough(place(98)));
-    EXPECT_FALSE(seen.all().seeThrough(place(103)));
+    EXPECT_TRUE(all(seen).seeThrough(place(98)));
+    EXPECT_FALSE(all(seen).seeThrough(place(103)));
 }
 
 }  // namespace

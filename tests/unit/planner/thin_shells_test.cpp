@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <vector>
 
 #include "planner_scene.h"
 #include "riftmap/planner/view_planner.h"
@@ -38,13 +39,23 @@ void hitPot(const Eigen::AlignedBox3d& box, const Point& origin, const Point& ra
     }
 }
 
-/// A pot with walls of some thickness (0: none), seen from its four sides and then aslant from
-/// above, so that a part of its inside is not seen.
+/// Three sides and the bottom of a pot, and aslant from above, so that a part of its inside is not
+/// seen.
+const std::vector<Point> kThreeSides = {Point(-1.5, 0, 0.1), Point(0, -1.5, 0.1),
+                                        Point(1.5, 0, 0.1), Point(0, 0.05, -1.5),
+                                        Point(-0.9, 0, 1.1)};
+
+std::vector<Point> allSides() {
+    std::vector<Point> sides = kThreeSides;
+    sides.emplace_back(0, 1.5, 0.1);
+    return sides;
+}
+
+/// A pot with walls of some thickness (0: none), and what was seen of it.
 class Pot {
  public:
-    explicit Pot(double wall) : wall_(wall) {
-        for (const Point& eye : {Point(-1.5, 0, 0.1), Point(0, -1.5, 0.1), Point(1.5, 0, 0.1),
-                                 Point(0, 1.5, 0.1), Point(0, 0.05, -1.5), Point(-0.9, 0, 1.1)}) {
+    explicit Pot(double wall, const std::vector<Point>& eyes = allSides()) : wall_(wall) {
+        for (const Point& eye : eyes) {
             const View view = test::viewOf(
                 lookAt(eye, Point::Zero()),
                 [this](const Point& origin, const Point& ray) { return hit(origin, ray); });
@@ -57,7 +68,7 @@ class Pot {
     }
     ThinShells shells() const { return {knowledge_.unseen(), knowledge_.summary(), frontier()}; }
     bool isInside(const Point& p) const {
-        return std::max(std::abs(p.x()), std::abs(p.y())) < kHalf && p.z() > -kHalf;
+        return std::max(std::abs(p.x()), std::abs(p.y())) < kHalf - wall_ && p.z() > wall_ - kHalf;
     }
 
  private:
@@ -114,14 +125,34 @@ TEST(ThinShells, holdTheInsideOfAPotWithWallsOfNoThickness) {
     EXPECT_FALSE(shells.touch({0, 0, 1}));
 }
 
+TEST(ThinShells, doNotHoldASideThatWasNotSeenThoughTheInsideLiesBehindIt) {
+    const Pot pot(0.0, kThreeSides);
+    const ThinShells shells = pot.shells();
+    std::size_t before = 0;
+    std::size_t held = 0;
+    for (const FreeSpace::Frontier& place : pot.frontier()) {
+        const Point p = place.centre.cast<double>();
+        const bool isBefore = p.y() > 0.45 && std::abs(p.x()) < 0.35 && std::abs(p.z()) < 0.35;
+        before += isBefore ? 1 : 0;
+        held += shells.hold(place) ? 1 : 0;
+        EXPECT_FALSE(isBefore && shells.hold(place)) << p.transpose();
+    }
+    EXPECT_GT(before, 30U);
+    EXPECT_GT(held, 50U) << "the test needs an inside that is held";
+}
+
 TEST(ThinShells, areNoneWhereWallsAreThick) {
     const Pot pot(0.1);
     const ThinShells shells = pot.shells();
     std::size_t inside = 0;
+    std::size_t within = 0;  // the walls themselves: nothing is to be seen there
     for (const FreeSpace::Frontier& place : pot.frontier()) {
-        inside += pot.isInside(place.centre.cast<double>()) ? 1 : 0;
-        EXPECT_FALSE(shells.hold(place)) << place.centre.transpose();
+        const bool in = pot.isInside(place.centre.cast<double>());
+        inside += in ? 1 : 0;
+        EXPECT_FALSE(in && shells.hold(place)) << place.centre.transpose();
+        within += !in && shells.hold(place) ? 1 : 0;
     }
+    EXPECT_LT(within, inside / 4);
     ASSERT_GT(inside, 100U) << "the test needs a part of the inside that was not seen";
 }
 

@@ -182,6 +182,8 @@ class PixelGraph {
     }
     /// Nearest living vertex within the radius [m]; the smallest id among equally near ones.
     std::optional<VertexId> nearest(const Eigen::Vector3f& point, float radius) const;
+    /// True if nearest() would find a vertex: faster, for the first one found will do.
+    bool anyWithin(const Eigen::Vector3f& point, float radius) const;
     /// True where the weight makes an edge between these vertices high: what the views said about
     /// the edge if it exists, else by delta or target resolution plus noise.
     bool isHigh(VertexId a, VertexId b, float weight) const;

@@ -13,6 +13,12 @@
 
 namespace riftmap {
 
+/// What the pixels of a view without a match show, from FreeSpace::emptyPixels(); row by row.
+struct EmptyPixels {
+    std::vector<float> depth;  ///< [m] before which there is nothing; 0: not known, or matched
+    std::vector<std::uint8_t> proven;  ///< 1: so sure that the pixel counts as measured
+};
+
 /// What is known of the space between the surfaces, from what the views saw through: a byte a
 /// voxel over the workspace. A voxel is free if some view measured only surfaces behind the whole
 /// of it. Answers where the camera may fly, how far that is, and where the unknown begins.
@@ -35,18 +41,19 @@ class FreeSpace {
     void declareFreeOutside(const Eigen::AlignedBox3d& surfaces);
     /// Free because the camera is there with its clearance.
     void declareFree(const Eigen::Vector3d& centre, double radius);
-    /// Pixels without a match before which nothing is, up to the far limit: 1 a pixel, for views
-    /// with `sensor.exactDepth`; else all 0. The part of the ray before the near limit, where
-    /// surface has no match either, is within the clearance or in voxels proven free: by
-    /// declareFreeOutside(), or by earlier views that had the whole voxel in their image, measured
-    /// at every pixel.
-    std::vector<std::uint8_t> emptyPixels(const View& view, const SensorModel& sensor) const;
-    /// What a view saw through; `empty` pixels count as measured, at the far limit.
-    /// `backgroundIsFree`: other rays that met nothing within the range make voxels known (no
-    /// surface to look for there), but not free to fly through: a surface nearer than the range has
-    /// no match either.
-    void carve(const View& view, const SensorModel& sensor, const std::vector<std::uint8_t>& empty,
-               bool backgroundIsFree);
+    /// What the pixels without a match show. With `sensor.exactDepth`: nothing up to the far limit,
+    /// proven where the part of the ray before the near limit, where surface has no match either,
+    /// is within the clearance or in voxels proven free: by declareFreeOutside(), or by earlier
+    /// views that had the whole voxel in their image, measured at every pixel. With
+    /// `backgroundIsFree` all others show nothing, too, as far as both cameras see, but for those
+    /// beside surface that is too near to be matched and those of a strip that one camera alone
+    /// sees: so far a pair of cameras matches what is there.
+    EmptyPixels emptyPixels(const View& view, const SensorModel& sensor,
+                            bool backgroundIsFree) const;
+    /// What a view saw through. Pixels that are proven empty count as measured; other empty ones
+    /// make voxels known (no surface to look for there), but not free to fly through: a surface
+    /// nearer than the range has no match either.
+    void carve(const View& view, const SensorModel& sensor, const EmptyPixels& empty);
     /// Marks the voxels of these points as surface, and no others.
     void setSurface(const std::vector<Eigen::Vector3d>& points);
     /// A piece of surface more, or one less that was added before: a voxel is surface while it

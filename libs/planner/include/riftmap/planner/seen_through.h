@@ -9,7 +9,7 @@
 
 #include "riftmap/core/view.h"
 #include "riftmap/graph/pixel_graph.h"
-#include "riftmap/planner/sensor_model.h"
+#include "riftmap/planner/free_space.h"
 
 namespace riftmap {
 
@@ -25,12 +25,8 @@ class SeenThrough {
     SeenThrough(const SeenThrough&) = delete;
     SeenThrough& operator=(const SeenThrough&) = delete;
 
-    /// `empty`: pixels without a match before which nothing is up to the far limit, from
-    /// FreeSpace::emptyPixels(). `backgroundIsFree`: what lies before other pixels without a match
-    /// was seen through, too, but for pixels that one camera alone sees and those beside surface
-    /// too near to be matched.
-    void add(const View& view, const SensorModel& sensor, const std::vector<std::uint8_t>& empty,
-             bool backgroundIsFree);
+    /// `empty`: from FreeSpace::emptyPixels(), for this view.
+    void add(const View& view, const EmptyPixels& empty);
 
     /// Some of the views; valid until the next add().
     class Views {
@@ -47,7 +43,6 @@ class SeenThrough {
     /// All that measured something within this box or behind it: whatever lies in it, the others
     /// did not see through.
     Views into(const Eigen::AlignedBox3d& box) const;
-    Views all() const;
 
  private:
     std::vector<Depths> views_;

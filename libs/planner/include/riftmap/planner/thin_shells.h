@@ -14,11 +14,11 @@ namespace riftmap {
 
 /// Hollow bodies with walls of no thickness, as scanned meshes with an open base are: what can be
 /// seen inside of them is the other side of surface that the map has, though every view into them
-/// opens up more unknown space. A body of frontier (voxels that touch) counts as the inside of one
-/// if, looking around from the free space before it, most of what stops the view is the back of
-/// known surface, or surface that was seen from both sides. Before the outside of a body, and in
-/// one with thick walls, it is the front; bodies with fewer than 100 backs are not judged, for a
-/// fold of the surface may look like that. Walls
+/// opens up more unknown space. A place of the frontier counts as the inside of one if, looking
+/// around from the free space before the frontier near it (of 12 voxels along each axis), most of
+/// what stops the view is the back of known surface, or surface that was seen from both sides.
+/// Before the outside of a body, and in one with thick walls, it is the front; fewer than 100 backs
+/// are not judged, for a fold of the surface may look like that. Walls
 /// thinner than a voxel of the frontier (2.5 cm at a resolution of 5 mm, see Knowledge::unseen())
 /// cannot be told from those of no thickness. Map frame, metres. Thread-safe once it is made.
 class ThinShells {

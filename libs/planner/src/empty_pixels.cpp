@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What the pixels of a view show that have no match.
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include "riftmap/core/parallel.h"
+#include "riftmap/planner/free_space.h"
+
+namespace riftmap {
+
+namespace {
+
+/// Greatest disparity of surface that a pixel of this row may show while the right camera does not
+/// see it, for what is matched to the right of it stands before it there [px]; 0 or less: none.
+/// Surface with a greater one both cameras see.
+std::vector<float> hiddenFromTheRight(const DisparityImage& d, int row) {
+    std::vector<float> hidden(static_cast<std::size_t>(d.width), 0.0F);
+    float before = 0;
+    for (int column = d.width - 1; column >= d.firstColumn; --column) {
+        before = std::max(before - 1, 0.0F);
+        hidden[static_cast<std::size_t>(column)] = before;
+        if (d.valid(column, row)) {
+            before = std::max(before, d.at(column, row));
+        }
+    }
+    return hidden;
+}
+
+/// A row's pixels without a match before which nothing is, by their neighbours: the strip beside a
+/// step that one camera alone sees is as wide as the step in disparity, and a surface that is too
+/// near has the greatest disparities beside it.
+void openBackground(const View& view, const SensorModel& sensor, int row,
+                    std::vector<float>& depth) {
+    constexpr float kWindow = 8;     // [px] that matching may add to such a strip
+    constexpr float kAlmost = 0.9F;  // of the greatest disparity
+    const DisparityImage& d = view.disparity;
+    const auto farLimit = static_cast<float>(sensor.farLimit);
+    const auto depthTimesDisparity = static_cast<float>(view.camera.fx * view.camera.baseline);
+    const std::vector<float> hidden = hiddenFromTheRight(d, row);
+    for (int begin = d.firstColumn; begin < d.width; ++begin) {
+        if (d.valid(begin, row)) {
+            continue;
+        }
+        int end = begin;
+        while (end < d.width && !d.valid(end, row)) {
+            ++end;
+        }
+        const float left = begin > d.firstColumn ? d.at(begin - 1, row) : 0.0F;
+        const float right = end < d.width ? d.at(end, row) : 0.0F;
+        const bool hole = begin > d.firstColumn && end < d.width;
+        const bool tooNear = std::max(left, right) > kAlmost * d.maxDisparity;
+        const bool oneSided =
+            hole && static_cast<float>(end - begin) <= std::abs(right - left) + kWindow;
+        for (int column = begin; column < end && !tooNear && !oneSided; ++column) {
+            const float behind = hidden[static_cast<std::size_t>(column)];
+            depth[d.index(column, row)] = sensor.exactDepth || behind <= 0
+                                              ? farLimit
+                                              : std::min(farLimit, depthTimesDisparity / behind);
+        }
+        begin = end;
+    }
+}
+
+}  // namespace
+
+bool FreeSpace::nothingTooNear(const View& view, const SensorModel& sensor, int column,
+                               int row) const {
+    const StereoCamera& c = view.camera;
+    const Eigen::Vector3d ray((column - c.cx) / c.fx, (row - c.cy) / c.fy, 1.0);
+    const double length = ray.norm();
+    const Eigen::Vector3d step = view.world_T_camera.rotation * ray / length;
+    const double end = sensor.nearLimit * length;
+    const double stride = 0.25 * voxel_;
+    for (double s = sensor.clearance; s < end + stride; s += stride) {
+        const Eigen::Vector3i v =
+            voxelOf(view.world_T_camera.translation + std::min(s, end) * step);
+        if (!inside(v) || (voxels_[index(v)] & (kProvenBit | kSurfaceBit)) != kProvenBit) {
+            return false;
+        }
+    }
+    return true;
+}
+
+EmptyPixels FreeSpace::emptyPixels(const View& view, const SensorModel& sensor,
+                                   bool backgroundIsFree) const {
+    const DisparityImage& d = view.disparity;
+    EmptyPixels empty{std::vector<float>(d.disparity.size(), 0.0F),
+                      std::vector<std::uint8_t>(d.disparity.size(), 0)};
+    parallelForEach(d.height, 8, [&](int row) {
+        if (backgroundIsFree) {
+            openBackground(view, sensor, row, empty.depth);
+        }
+        for (int column = d.firstColumn; column < d.width && sensor.exactDepth; ++column) {
+            if (!d.valid(column, row) && nothingTooNear(view, sensor, column, row)) {
+                empty.proven[d.index(column, row)] = 1;
+                empty.depth[d.index(column, row)] = static_cast<float>(sensor.farLimit);
+            }
+        }
+    });
+    return empty;
+}
+
+}  // namespace riftmap

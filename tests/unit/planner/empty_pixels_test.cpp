@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "planner_scene.h"
+#include "riftmap/planner/free_space.h"
+
+namespace riftmap {
+namespace {
+
+constexpr double kFar = 6;
+
+SensorModel sensorOf(const View& view, bool exactDepth) {
+    PlatformLimits limits;
+    limits.farLimit = kFar;
+    limits.exactDepth = exactDepth;
+    return SensorModel::of(view, limits);
+}
+
+EmptyPixels emptyPixelsOf(const View& view, bool exactDepth, bool backgroundIsFree) {
+    const Eigen::AlignedBox3d small(Eigen::Vector3d::Zero(), Eigen::Vector3d::Ones());
+    return FreeSpace(small, 0.1).emptyPixels(view, sensorOf(view, exactDepth), backgroundIsFree);
+}
+
+/// Spheres before nothing, as a pair of cameras at the origin sees them: where one camera alone
+/// sees a surface there is no match.
+class Spheres {
+ public:
+    explicit Spheres(std::mt19937& random) {
+        std::uniform_real_distribution<double> in(-1, 1);
+        for (Sphere& s : spheres_) {
+            s = {{0.8 * in(random), 0.5 * in(random), 2.0 + 0.8 * in(random)},
+                 0.2 + 0.15 * in(random)};
+        }
+    }
+    /// Depth along a ray of z = 1.
+    std::optional<double> depth(const Eigen::Vector3d& origin, const Eigen::Vector3d& ray) const {
+        double least = std::numeric_limits<double>::infinity();
+        for (const Sphere& s : spheres_) {
+            const Eigen::Vector3d o = origin - s.centre;
+            const double b = o.dot(ray) / ray.squaredNorm();
+            const double c = (o.squaredNorm() - s.radius * s.radius) / ray.squaredNorm();
+            if (b * b > c) {
+                least = std::min(least, -b - std::sqrt(b * b - c));
+            }
+        }
+        return std::isfinite(least) ? std::optional(least) : std::nullopt;
+    }
+    View view() const {
+        const double baseline = test::smallCamera().baseline;
+        return test::viewOf(Pose(), [&](const auto& eye, const auto& ray) {
+            auto z = depth(eye, ray);
+            const Eigen::Vector3d right = eye + Eigen::Vector3d(baseline, 0, 0);
+            if (z && *depth(right, (*z * ray - right) / *z) < *z - 1e-6) {
+                z.reset();
+            }
+            return z;
+        });
+    }
+
+ private:
+    struct Sphere {
+        Eigen::Vector3d centre;
+        double radius = 0;
+    };
+    std::array<Sphere, 6> spheres_;
+};
+
+TEST(EmptyPixels, areNoDeeperThanWhatOneCameraAloneSees) {
+    int halfOccluded = 0;
+    for (unsigned seed = 1; seed <= 20; ++seed) {
+        SCOPED_TRACE("seed " + std::to_string(seed));
+        std::mt19937 random(seed);
+        const Spheres spheres(random);
+        const View view = spheres.view();
+        const EmptyPixels empty = emptyPixelsOf(view, false, true);
+        int open = 0, background = 0;
+        for (int row = 0; row < view.camera.height; ++row) {
+            for (int column = 0; column < view.camera.width; ++column) {
+                const std::size_t i = view.disparity.index(column, row);
+                EXPECT_EQ(empty.proven[i], 0);
+                if (view.disparity.valid(column, row)) {
+                    EXPECT_EQ(empty.depth[i], 0);
+                    continue;
+                }
+                const auto z =
+                    spheres.depth(Eigen::Vector3d::Zero(),
+                                  view.camera.backProject(column, row, 1) / view.camera.depth(1));
+                if (z) {  // the strip may be a pixel wider than it should be
+                    ++halfOccluded;
+                    const double least = view.camera.depth(view.camera.disparity(*z) - 1);
+                    EXPECT_LE(static_cast<double>(empty.depth[i]), least) << column << " " << row;
+                } else {
+                    ++background;
+                    open += static_cast<double>(empty.depth[i]) == kFar ? 1 : 0;
+                }
+            }
+        }
+        EXPECT_GT(open, 0.6 * background);
+    }
+    EXPECT_GT(halfOccluded, 1000);
+}
+
+TEST(EmptyPixels, ofExactDepthAreSeenByOneCamera) {
+    std::mt19937 random(1);
+    const View view = Spheres(random).view();
+    const EmptyPixels exact = emptyPixelsOf(view, true, true);
+    const EmptyPixels noisy = emptyPixelsOf(view, false, true);
+    std::size_t deeper = 0;
+    for (std::size_t i = 0; i < exact.depth.size(); ++i) {
+        EXPECT_GE(exact.depth[i], noisy.depth[i]);
+        deeper += exact.depth[i] > noisy.depth[i] ? 1U : 0U;
+    }
+    EXPECT_GT(deeper, 100U);
+}
+
+TEST(EmptyPixels, areNoneWhereTheBackgroundMayHideSurface) {
+    std::mt19937 random(1);
+    const EmptyPixels empty = emptyPixelsOf(Spheres(random).view(), false, false);
+    EXPECT_TRUE(std::all_of(empty.depth.begin(), empty.depth.end(),
+                            [](float depth) { return depth == 0.0F; }));
+}
+
+}  // namespace
+}  // namespace riftmap
