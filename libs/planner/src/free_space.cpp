@@ -124,7 +124,8 @@ FreeSpace::State FreeSpace::at(const Eigen::Vector3d& point) const {
 
 void FreeSpace::noteTry(const Eigen::Vector3d& point) {
     const Eigen::Vector3i v = voxelOf(point);
-    if (inside(v) && (voxels_[index(v)] >> kTryShift) < kTries) {
+    const std::uint8_t voxel = inside(v) ? voxels_[index(v)] : kFreeBit;
+    if ((voxel & (kFreeBit | kSurfaceBit)) == 0 && (voxel >> kTryShift) < kTries) {
         voxels_[index(v)] = static_cast<std::uint8_t>(voxels_[index(v)] + (1 << kTryShift));
     }
 }

@@ -140,9 +140,8 @@ void Knowledge::update(const View& view) {
     seenThrough_.add(view, empty);
     summary_.update(*graph_, view, &seenThrough_);
     ledger_.update(summary_);
-    // The camera is here with its clearance; two voxels more let it take the first step without
-    // having looked straight up and down. Surface that is seen in them counts all the same.
-    space_.declareFree(camera_.translation, limits_.clearance + 2.2 * space_.voxelSize());
+    // Surface that is seen in there counts all the same.
+    space_.declareFree(camera_.translation, freeAround());
     space_.carve(view, sensor_, empty);
     updateSurface(space_);
     for (std::size_t i = 0; i < summary_.changed().size(); ++i) {

@@ -436,6 +436,9 @@ std::optional<ViewPlan> Choice::lastResorts() {
 }
 
 std::optional<ViewPlan> Choice::make() {
+    if (auto plan = wayOut()) {
+        return plan;
+    }
     const auto& open = scorer_.open();
     const auto targets = static_cast<std::size_t>(k_.options().targets);
     const std::size_t stride = std::max<std::size_t>(1, open.size() / targets);

@@ -96,9 +96,7 @@ void SurfaceExplorer::look(const std::optional<ViewPlan>& plan, double planMs) {
         knowledge_.ledger().judge(knowledge_.summary(), plan->cells, before,
                                   view.world_T_camera.translation);
         for (const Eigen::Vector3d& place : unknown) {
-            if (knowledge_.unseen().at(place) == FreeSpace::State::kUnknown) {
-                knowledge_.unseen().noteTry(place);
-            }
+            knowledge_.unseen().noteTry(place);
         }
         step.gain = plan->gain;
         step.coarseGain = plan->coarseGain;

@@ -31,6 +31,34 @@ FreeSpace::UnknownRun FreeSpace::firstUnknown(const Eigen::Vector3d& origin,
     return run;
 }
 
+std::vector<Eigen::Vector3d> FreeSpace::toBeLookedAt(const Eigen::Vector3d& from,
+                                                     const Eigen::Vector3d& to,
+                                                     double radius) const {
+    const Eigen::Vector3d reach = Eigen::Vector3d::Constant(radius);
+    const Eigen::Vector3i first = voxelOf(from.cwiseMin(to) - reach).cwiseMax(0);
+    const Eigen::Vector3i last =
+        voxelOf(from.cwiseMax(to) + reach).cwiseMin(size_ - Eigen::Vector3i::Ones());
+    const Eigen::Vector3d way = to - from;
+    std::vector<Eigen::Vector3d> unknown;
+    for (int z = first.z(); z <= last.z(); ++z) {
+        for (int y = first.y(); y <= last.y(); ++y) {
+            for (int x = first.x(); x <= last.x(); ++x) {
+                const Eigen::Vector3d p = centre({x, y, z});
+                const double s = std::clamp(way.dot(p - from) / way.squaredNorm(), 0.0, 1.0);
+                const std::uint8_t voxel = voxels_[index({x, y, z})];
+                if (passable(voxel) || (p - from - s * way).norm() >= radius) {
+                    continue;
+                }
+                if ((voxel & kSurfaceBit) != 0 || (voxel >> kTryShift) >= kTries) {
+                    return {};
+                }
+                unknown.push_back(p);
+            }
+        }
+    }
+    return unknown;
+}
+
 std::vector<FreeSpace::Frontier> FreeSpace::frontier(const Eigen::AlignedBox3d& within) const {
     const auto looks = [&](const Eigen::Vector3i& v) {
         const std::uint8_t voxel = voxels_[index(v)];

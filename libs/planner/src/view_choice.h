@@ -60,6 +60,8 @@ class Choice {
     void giveUp(const RiftRecord& record, bool reachable, bool visible);
     std::optional<ViewPlan> lastResorts();
     bool lineOfSight(const Eigen::Vector3d& eye, const Eigen::Vector3d& target) const;
+    std::vector<Eigen::Vector3d> inTheWayOut() const;
+    std::optional<ViewPlan> wayOut();
     std::optional<ViewPlan> makeAround(const Eigen::AlignedBox3d& box);
     void addPlacesAround(const Eigen::AlignedBox3d& box);
 

@@ -78,8 +78,8 @@ class FreeSpace {
     };
     /// All of them whose centre is in the box, but those looked at in vain; in a fixed order.
     std::vector<Frontier> frontier(const Eigen::AlignedBox3d& within) const;
-    /// Notes that a view was taken to see this place; places that are unknown still after `kTries`
-    /// views do not count as unknown any more.
+    /// Notes that a view was taken to see this place, unless it is free or surface now; places that
+    /// are unknown still after `kTries` views do not count as unknown any more.
     void noteTry(const Eigen::Vector3d& point);
     static constexpr std::uint8_t kTries = 2;
 
@@ -107,6 +107,10 @@ class FreeSpace {
     /// cut that is known and shares a face with one of surface, or with `corners` one before a
     /// measured surface that shares a face, an edge or a corner.
     bool knownAround(const Eigen::Vector3d& point, double radius, bool corners) const;
+    /// Centres of the voxels nearer than `radius` to the straight segment that are not known to be
+    /// free; empty if there are none, or if surface is among them or one looked at in vain.
+    std::vector<Eigen::Vector3d> toBeLookedAt(const Eigen::Vector3d& from,
+                                              const Eigen::Vector3d& to, double radius) const;
     /// Centre of the nearest voxel, at most `reach` voxels away along each axis, that is clear (or
     /// with `reached` can be reached as well); nothing if there is none.
     std::optional<Eigen::Vector3d> nearestClear(const Eigen::Vector3d& point, int reach,

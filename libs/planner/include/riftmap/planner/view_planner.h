@@ -60,6 +60,8 @@ class Knowledge {
     /// they do; false if they did before, or if the last look was less than 20 views ago and it is
     /// not `atTheEnd`.
     bool openPassages(bool atTheEnd);
+    /// Voxels of free space that the last updateReach() found the camera to fit in.
+    std::size_t reached() const { return reached_; }
     /// A place where the camera fits, and the way there.
     struct Place {
         Eigen::Vector3d eye;
@@ -74,6 +76,9 @@ class Knowledge {
     const PlatformLimits& limits() const { return limits_; }
     const PlannerOptions& options() const { return options_; }
     double clearance() const { return limits_.clearance + options_.clearanceMargin; }
+    /// What is taken to be free around a camera that takes a view [m]: two voxels more than its
+    /// clearance let it take the first step without having looked straight up and down.
+    double freeAround() const { return limits_.clearance + 2.2 * space_.voxelSize(); }
     const SensorModel& sensor() const { return sensor_; }
     const SurfaceSummary& summary() const { return summary_; }
     const FreeSpace& space() const { return space_; }

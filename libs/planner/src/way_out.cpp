@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The first steps: what a camera sees is a pyramid, which near its tip is narrower than the room
+// that the camera itself takes.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "riftmap/core/parallel.h"
+#include "view_choice.h"
+
+namespace riftmap {
+
+namespace {
+
+/// The i-th of n directions that are spread evenly, without one straight up or down.
+Eigen::Vector3d direction(int i, int n) {
+    const double z = 1 - (2 * i + 1.0) / n;
+    const double r = std::sqrt(1 - z * z);
+    return {r * std::cos(2.399963 * i), r * std::sin(2.399963 * i), z};
+}
+
+}  // namespace
+
+/// The unknown voxels that stand in the way of a camera that cannot leave its place, on the
+/// straight way out that has fewest of them; empty if there is none.
+std::vector<Eigen::Vector3d> Choice::inTheWayOut() const {
+    constexpr int kWays = 200;
+    const Eigen::Vector3d eye = k_.camera().translation;
+    const double radius = k_.clearance() + 1.5 * k_.space().voxelSize();
+    std::vector<Eigen::Vector3d> fewest;
+    // So far that the pyramid is wide enough; less where the room is too small for that.
+    for (const double length : {5.0, 3.5, 2.5}) {
+        for (int i = 0; i < kWays; ++i) {
+            const Eigen::Vector3d to = eye + length * k_.clearance() * direction(i, kWays);
+            if (!k_.cameraBox().contains(to)) {
+                continue;
+            }
+            auto voxels = k_.space().toBeLookedAt(eye, to, radius);
+            if (!voxels.empty() && (fewest.empty() || voxels.size() < fewest.size())) {
+                fewest = std::move(voxels);
+            }
+        }
+        if (!fewest.empty()) {
+            break;
+        }
+    }
+    return fewest;
+}
+
+/// Where the camera cannot leave its place: of the views that free most of what may stand in its
+/// way, by sight and by being there, the one that shows most else.
+std::optional<ViewPlan> Choice::wayOut() {
+    constexpr std::size_t kFew = 64;  // [voxels] that can be reached
+    if (k_.reached() >= kFew) {
+        return std::nullopt;
+    }
+    const std::vector<Eigen::Vector3d> inTheWay = inTheWayOut();
+    if (inTheWay.empty()) {
+        return std::nullopt;
+    }
+    const StereoCamera& camera = k_.sensor().camera;
+    const auto freedBy = [&](const Pose& pose) {
+        std::vector<Eigen::Vector3d> freed;
+        const Pose camera_T_world = pose.inverse();
+        std::copy_if(inTheWay.begin(), inTheWay.end(), std::back_inserter(freed),
+                     [&](const Eigen::Vector3d& voxel) {
+                         const Eigen::Vector3d p = camera_T_world * voxel;
+                         if (p.norm() < k_.freeAround()) {
+                             return true;
+                         }
+                         if (p.z() < k_.space().voxelSize()) {
+                             return false;
+                         }
+                         const Eigen::Vector2d uv = camera.project(p);
+                         return uv.x() >= k_.sensor().firstColumn && uv.y() >= 0 &&
+                                uv.x() <= camera.width - 1 && uv.y() <= camera.height - 1;
+                     });
+        return freed;
+    };
+    constexpr int kViews = 200;
+    std::vector<Eigen::Vector3d> eyes = k_.space().reachable(1);
+    eyes.push_back(k_.camera().translation);
+    for (const Eigen::Vector3d& eye : eyes) {
+        for (int i = 0; i < kViews; ++i) {
+            add(eye, eye + direction(i, kViews));
+        }
+    }
+    std::vector<std::size_t> freed(candidates_.size());
+    parallelForEach(freed.size(), 16,
+                    [&](std::size_t i) { freed[i] = freedBy(candidates_[i].pose).size(); });
+    const std::size_t most = freed.empty() ? 0 : *std::max_element(freed.begin(), freed.end());
+    std::size_t next = 0;
+    std::erase_if(candidates_,
+                  [&](const Candidate&) { return most == 0 || 10 * freed[next++] < 9 * most; });
+    preselect();
+    scoreFrom(0);
+    const Candidate* b = best();
+    auto plan = b != nullptr ? planFor(Candidate(*b)) : std::nullopt;
+    if (plan) {
+        plan->unknown = freedBy(plan->path.back());
+    }
+    candidates_.clear();
+    return plan;
+}
+
+}  // namespace riftmap
