@@ -23,18 +23,25 @@ struct SeenThrough::Depths {
     std::vector<float> farthest;  ///< of each tile, row by row
 
     int tileColumns() const { return (camera.width + kTile - 1) / kTile; }
+    std::size_t pixel(int row, int column) const { return at(row, column, camera.width); }
+    std::size_t tile(int row, int column) const { return at(row, column, tileColumns()); }
     void findFarthest();
     bool reachInto(const Eigen::AlignedBox3d& box) const;
+
+ private:
+    static std::size_t at(int row, int column, int columns) {
+        return static_cast<std::size_t>(row) * static_cast<std::size_t>(columns) +
+               static_cast<std::size_t>(column);
+    }
 };
 
 void SeenThrough::Depths::findFarthest() {
     const int rows = (camera.height + kTile - 1) / kTile;
-    farthest.assign(static_cast<std::size_t>(rows * tileColumns()), 0.0F);
+    farthest.assign(tile(rows, 0), 0.0F);
     for (int row = 0; row < camera.height; ++row) {
         for (int column = 0; column < camera.width; ++column) {
-            float& most =
-                farthest[static_cast<std::size_t>(row / kTile * tileColumns() + column / kTile)];
-            most = std::max(most, depth[static_cast<std::size_t>(row * camera.width + column)]);
+            float& most = farthest[tile(row / kTile, column / kTile)];
+            most = std::max(most, depth[pixel(row, column)]);
         }
     }
 }
@@ -66,8 +73,7 @@ bool SeenThrough::Depths::reachInto(const Eigen::AlignedBox3d& box) const {
     const auto [top, bottom] = tiles(p.y(), camera.fy, camera.cy, camera.height);
     for (int row = top; row <= bottom; ++row) {
         for (int column = left; column <= right; ++column) {
-            if (static_cast<double>(
-                    farthest[static_cast<std::size_t>(row * tileColumns() + column)]) > front) {
+            if (static_cast<double>(farthest[tile(row, column)]) > front) {
                 return true;
             }
         }
@@ -118,8 +124,7 @@ bool SeenThrough::Views::seeThrough(const Eigen::Vector3d& place) const {
         const auto column = static_cast<int>(std::lround(uv.x()));
         const auto row = static_cast<int>(std::lround(uv.y()));
         return column >= 0 && row >= 0 && column < v->camera.width && row < v->camera.height &&
-               p.z() < static_cast<double>(
-                           v->depth[static_cast<std::size_t>(row * v->camera.width + column)]);
+               p.z() < static_cast<double>(v->depth[v->pixel(row, column)]);
     });
 }
 
