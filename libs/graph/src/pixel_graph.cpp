@@ -155,7 +155,7 @@ bool PixelGraph::anyWithin(const Eigen::Vector3f& point, float radius) const {
             const float dx = page.x[slot] - point.x();
             const float dy = page.y[slot] - point.y();
             const float dz = page.z[slot] - point.z();
-            near |= std::uint64_t{dx * dx + dy * dy + dz * dz < limit} << slot;
+            near |= std::uint64_t{dx * dx + dy * dy + dz * dz <= limit} << slot;
         }
         return (near & page.alive) != 0;
     };
@@ -163,7 +163,7 @@ bool PixelGraph::anyWithin(const Eigen::Vector3f& point, float radius) const {
     s.forEachBlockIn(point - reach, point + reach, [&](std::uint32_t block) {
         const auto& pages = s.blocks()[block].pages;
         found = found || std::any_of(pages.begin(), pages.end(), [&](std::uint32_t index) {
-                    return s.bounds(index).squaredDistance(point) < limit && holds(s.page(index));
+                    return s.bounds(index).squaredDistance(point) <= limit && holds(s.page(index));
                 });
     });
     return found;

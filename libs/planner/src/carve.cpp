@@ -47,8 +47,8 @@ class DepthRectangles {
         }
     }
 
-    /// Least depth over the pixels [c0, c1] x [r0, r1], or a little more than them; pixels without
-    /// a measurement do not count.
+    /// Least depth over the pixels [c0, c1] x [r0, r1], or a little more than them; pixels that
+    /// show nothing do not count.
     float least(int c0, int r0, int c1, int r1) const {
         int level = 0;
         while (std::max((c1 >> level) - (c0 >> level), (r1 >> level) - (r0 >> level)) > 3 &&

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "riftmap/core/parallel.h"
@@ -13,13 +14,13 @@ namespace riftmap {
 namespace {
 
 /// Greatest disparity of surface that a pixel of this row may show while the right camera does not
-/// see it, for what is matched to the right of it stands before it there [px]; 0 or less: none.
-/// Surface with a greater one both cameras see.
+/// see it, for what is matched to the right of it stands before it there [px]; minus infinity:
+/// there is none. Surface with a greater one both cameras see.
 std::vector<float> hiddenFromTheRight(const DisparityImage& d, int row) {
-    std::vector<float> hidden(static_cast<std::size_t>(d.width), 0.0F);
-    float before = 0;
+    std::vector<float> hidden(static_cast<std::size_t>(d.width));
+    float before = -std::numeric_limits<float>::infinity();
     for (int column = d.width - 1; column >= d.firstColumn; --column) {
-        before = std::max(before - 1, 0.0F);
+        before -= 1;
         hidden[static_cast<std::size_t>(column)] = before;
         if (d.valid(column, row)) {
             before = std::max(before, d.at(column, row));
@@ -37,7 +38,6 @@ void openBackground(const View& view, const SensorModel& sensor, int row,
     constexpr float kAlmost = 0.9F;  // of the greatest disparity
     const DisparityImage& d = view.disparity;
     const auto farLimit = static_cast<float>(sensor.farLimit);
-    const auto depthTimesDisparity = static_cast<float>(view.camera.fx * view.camera.baseline);
     const std::vector<float> hidden = hiddenFromTheRight(d, row);
     for (int begin = d.firstColumn; begin < d.width; ++begin) {
         if (d.valid(begin, row)) {
@@ -51,13 +51,14 @@ void openBackground(const View& view, const SensorModel& sensor, int row,
         const float right = end < d.width ? d.at(end, row) : 0.0F;
         const bool hole = begin > d.firstColumn && end < d.width;
         const bool tooNear = std::max(left, right) > kAlmost * d.maxDisparity;
-        const bool oneSided =
-            hole && static_cast<float>(end - begin) <= std::abs(right - left) + kWindow;
+        const bool oneSided = !sensor.exactDepth && hole &&
+                              static_cast<float>(end - begin) <= std::abs(right - left) + kWindow;
         for (int column = begin; column < end && !tooNear && !oneSided; ++column) {
-            const float behind = hidden[static_cast<std::size_t>(column)];
-            depth[d.index(column, row)] = sensor.exactDepth || behind <= 0
-                                              ? farLimit
-                                              : std::min(farLimit, depthTimesDisparity / behind);
+            const auto behind = static_cast<double>(hidden[static_cast<std::size_t>(column)]);
+            // Beyond all depths, or nothing there: `depth` is that of a disparity above its offset.
+            const bool all = sensor.exactDepth || behind + view.camera.doffs <= 0;
+            depth[d.index(column, row)] =
+                all ? farLimit : std::min(farLimit, static_cast<float>(view.camera.depth(behind)));
         }
         begin = end;
     }

@@ -111,8 +111,10 @@ void PlannerOptions::describe(OptionTable& table) {
     table.add("surface_box", surfaceBox, 0, "m",
               "Surfaces lie in this box (xmin ymin zmin xmax ymax zmax) and the space around it is "
               "free; empty = nothing is known beforehand");
-    table.add("background_is_free", backgroundIsFree,
-              "Pixels without a match show that there is no surface within the range");
+    table.add(
+        "background_is_free", backgroundIsFree,
+        "Pixels without a match show that there is no surface within the range, as far as both "
+        "cameras see and but for those beside surface too near to be matched");
 }
 
 Knowledge::Knowledge(const PixelGraph& graph, const PlatformLimits& limits,

@@ -38,8 +38,8 @@ ThinShells::ThinShells(const FreeSpace& space, const SurfaceSummary& summary,
     std::vector<Around> seen(frontier.size());
     parallelForEach(frontier.size(), 16,
                     [&](std::size_t i) { seen[i] = lookAround(space, frontier[i]); });
-    // By pieces of the frontier and what lies around them: it may be one with what is unknown
-    // behind a hole that was not looked into yet.
+    // By pieces of the frontier and those around: the inside may be one with what is unknown behind
+    // a side that was not seen yet.
     const auto pieceOf = [&](const FreeSpace::Frontier& place) {
         return Eigen::Vector3i(
             voxelOf(place.centre.cast<double>()).unaryExpr([](int x) { return x >> kPieceBits; }));
@@ -48,16 +48,23 @@ ThinShells::ThinShells(const FreeSpace& space, const SurfaceSummary& summary,
     for (std::size_t i = 0; i < frontier.size(); ++i) {
         pieces[SurfaceSummary::keyAt(pieceOf(frontier[i]))] += seen[i];
     }
-    constexpr int kLeast = 100;  // [backs] fewer may be a fold, and promise little
-    for (const FreeSpace::Frontier& place : frontier) {
+    std::unordered_set<std::uint64_t> within;
+    for (const auto& piece : pieces) {
+        constexpr int kLeast = 100;  // [backs] fewer may be a fold, and promise little
         Around all;
         for (int i = 0; i < kAround; ++i) {
-            const auto it = pieces.find(SurfaceSummary::keyAt(pieceOf(place) + around(i)));
+            const auto it = pieces.find(
+                SurfaceSummary::keyAt(SurfaceSummary::indexOf(piece.first) + around(i)));
             if (it != pieces.end()) {
                 all += it->second;
             }
         }
         if (all.backs >= kLeast && 2 * all.backs > all.all) {
+            within.insert(piece.first);
+        }
+    }
+    for (const FreeSpace::Frontier& place : frontier) {
+        if (within.contains(SurfaceSummary::keyAt(pieceOf(place)))) {
             inside_.insert(SurfaceSummary::keyAt(voxelOf(place.centre.cast<double>())));
         }
     }

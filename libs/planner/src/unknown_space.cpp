@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What of the free space is unknown, and where it begins.
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
@@ -39,12 +40,13 @@ std::vector<Eigen::Vector3d> FreeSpace::toBeLookedAt(const Eigen::Vector3d& from
     const Eigen::Vector3i last =
         voxelOf(from.cwiseMax(to) + reach).cwiseMin(size_ - Eigen::Vector3i::Ones());
     const Eigen::Vector3d way = to - from;
+    const double length2 = std::max(way.squaredNorm(), 1e-12);
     std::vector<Eigen::Vector3d> unknown;
     for (int z = first.z(); z <= last.z(); ++z) {
         for (int y = first.y(); y <= last.y(); ++y) {
             for (int x = first.x(); x <= last.x(); ++x) {
                 const Eigen::Vector3d p = centre({x, y, z});
-                const double s = std::clamp(way.dot(p - from) / way.squaredNorm(), 0.0, 1.0);
+                const double s = std::clamp(way.dot(p - from) / length2, 0.0, 1.0);
                 const std::uint8_t voxel = voxels_[index({x, y, z})];
                 if (passable(voxel) || (p - from - s * way).norm() >= radius) {
                     continue;

@@ -3,7 +3,7 @@
 // that the camera itself takes.
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <iterator>
 
 #include "riftmap/core/parallel.h"
 #include "view_choice.h"
@@ -50,54 +50,61 @@ std::vector<Eigen::Vector3d> Choice::inTheWayOut() const {
 /// Where the camera cannot leave its place: of the views that free most of what may stand in its
 /// way, by sight and by being there, the one that shows most else.
 std::optional<ViewPlan> Choice::wayOut() {
-    constexpr std::size_t kFew = 64;  // [voxels] that can be reached
-    if (k_.reached() >= kFew) {
+    constexpr std::size_t kFew = 64;                // [voxels] that can be reached
+    if (k_.surfaceBox() || k_.reached() >= kFew) {  // around an object all is free
         return std::nullopt;
+    }
+    std::vector<Eigen::Vector3d> eyes = k_.space().reachable(1);
+    if (eyes.size() >= kFew) {  // by passages
+        return std::nullopt;
+    }
+    if (eyes.empty()) {
+        eyes.push_back(k_.camera().translation);
     }
     const std::vector<Eigen::Vector3d> inTheWay = inTheWayOut();
     if (inTheWay.empty()) {
         return std::nullopt;
     }
     const StereoCamera& camera = k_.sensor().camera;
-    const auto freedBy = [&](const Pose& pose) {
-        std::vector<Eigen::Vector3d> freed;
-        const Pose camera_T_world = pose.inverse();
-        std::copy_if(inTheWay.begin(), inTheWay.end(), std::back_inserter(freed),
-                     [&](const Eigen::Vector3d& voxel) {
-                         const Eigen::Vector3d p = camera_T_world * voxel;
-                         if (p.norm() < k_.freeAround()) {
-                             return true;
-                         }
-                         if (p.z() < k_.space().voxelSize()) {
-                             return false;
-                         }
-                         const Eigen::Vector2d uv = camera.project(p);
-                         return uv.x() >= k_.sensor().firstColumn && uv.y() >= 0 &&
-                                uv.x() <= camera.width - 1 && uv.y() <= camera.height - 1;
-                     });
-        return freed;
+    const auto isFreed = [&](const Pose& camera_T_world, const Eigen::Vector3d& voxel) {
+        const Eigen::Vector3d p = camera_T_world * voxel;
+        if (p.z() < k_.space().voxelSize() || p.norm() < k_.freeAround()) {
+            return p.norm() < k_.freeAround();
+        }
+        const Eigen::Vector2d uv = camera.project(p);
+        return uv.x() >= k_.sensor().firstColumn && uv.y() >= 0 && uv.x() <= camera.width - 1 &&
+               uv.y() <= camera.height - 1;
     };
     constexpr int kViews = 200;
-    std::vector<Eigen::Vector3d> eyes = k_.space().reachable(1);
-    eyes.push_back(k_.camera().translation);
     for (const Eigen::Vector3d& eye : eyes) {
         for (int i = 0; i < kViews; ++i) {
             add(eye, eye + direction(i, kViews));
         }
     }
-    std::vector<std::size_t> freed(candidates_.size());
-    parallelForEach(freed.size(), 16,
-                    [&](std::size_t i) { freed[i] = freedBy(candidates_[i].pose).size(); });
-    const std::size_t most = freed.empty() ? 0 : *std::max_element(freed.begin(), freed.end());
-    std::size_t next = 0;
-    std::erase_if(candidates_,
-                  [&](const Candidate&) { return most == 0 || 10 * freed[next++] < 9 * most; });
+    std::vector<std::ptrdiff_t> freed(candidates_.size());
+    parallelForEach(freed.size(), 16, [&](std::size_t i) {
+        const Pose camera_T_world = candidates_[i].pose.inverse();
+        freed[i] = std::count_if(inTheWay.begin(), inTheWay.end(),
+                                 [&](const auto& v) { return isFreed(camera_T_world, v); });
+    });
+    const std::ptrdiff_t most = freed.empty() ? 0 : *std::max_element(freed.begin(), freed.end());
+    std::vector<Candidate> good;
+    for (std::size_t i = 0; i < freed.size(); ++i) {
+        if (most > 0 && 10 * freed[i] >= 9 * most) {
+            good.push_back(candidates_[i]);
+        }
+    }
+    candidates_ = std::move(good);
     preselect();
     scoreFrom(0);
+    std::erase_if(candidates_, [](const Candidate& c) { return c.score.nearShare > 0.3; });
     const Candidate* b = best();
-    auto plan = b != nullptr ? planFor(Candidate(*b)) : std::nullopt;
+    auto plan = b != nullptr ? planFor(*b) : std::nullopt;
     if (plan) {
-        plan->unknown = freedBy(plan->path.back());
+        plan->unknown.clear();
+        const Pose camera_T_world = plan->path.back().inverse();
+        std::copy_if(inTheWay.begin(), inTheWay.end(), std::back_inserter(plan->unknown),
+                     [&](const auto& v) { return isFreed(camera_T_world, v); });
     }
     candidates_.clear();
     return plan;

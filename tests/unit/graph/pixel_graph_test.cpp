@@ -389,6 +389,10 @@ TEST(PixelGraph, NearestAndBoxAgreeWithBruteForce) {
             }
         });
         EXPECT_EQ(graph.nearest(p, radius), expected);
+        if (expected) {  // the limit itself counts
+            EXPECT_TRUE(graph.nearest(graph.position(*expected), 0.0F));
+            EXPECT_TRUE(graph.anyWithin(graph.position(*expected), 0.0F));
+        }
         EXPECT_EQ(graph.anyWithin(p, radius), expected.has_value());
         std::set<VertexId> found;
         graph.forEachVertexIn(p - Eigen::Vector3f::Constant(0.1F),

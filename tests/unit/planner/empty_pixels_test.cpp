@@ -119,6 +119,31 @@ TEST(EmptyPixels, ofExactDepthAreSeenByOneCamera) {
     EXPECT_GT(deeper, 100U);
 }
 
+TEST(EmptyPixels, areAsDeepWithAnOffsetOfTheDisparities) {
+    std::mt19937 random(2);
+    View view = Spheres(random).view();
+    const EmptyPixels plain = emptyPixelsOf(view, false, true);
+    view.camera.doffs = 10;
+    view.disparity.minDisparity -= 10;
+    for (float& d : view.disparity.disparity) {
+        d -= 10;
+    }
+    const EmptyPixels shifted = emptyPixelsOf(view, false, true);
+    for (std::size_t i = 0; i < plain.depth.size(); ++i) {
+        ASSERT_NEAR(shifted.depth[i], plain.depth[i], 1e-4);
+    }
+}
+
+TEST(EmptyPixels, ofExactDepthAreSeenThroughANarrowHole) {
+    View view = test::viewOf(Pose(), [](const auto&, const auto&) { return std::optional(2.0); });
+    for (int column = 100; column < 107; ++column) {
+        view.disparity.disparity[view.disparity.index(column, 95)] = kNoDisparity;
+    }
+    const std::size_t hole = view.disparity.index(103, 95);
+    EXPECT_EQ(emptyPixelsOf(view, true, true).depth[hole], static_cast<float>(kFar));
+    EXPECT_EQ(emptyPixelsOf(view, false, true).depth[hole], 0.0F);
+}
+
 TEST(EmptyPixels, areNoneWhereTheBackgroundMayHideSurface) {
     std::mt19937 random(1);
     const EmptyPixels empty = emptyPixelsOf(Spheres(random).view(), false, false);

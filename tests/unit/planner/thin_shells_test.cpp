@@ -70,6 +70,11 @@ class Pot {
     bool isInside(const Point& p) const {
         return std::max(std::abs(p.x()), std::abs(p.y())) < kHalf - wall_ && p.z() > wall_ - kHalf;
     }
+    /// In a wall, or within two voxels of its rim.
+    bool isInWall(const Point& p) const {
+        const double side = std::max(std::abs(p.x()), std::abs(p.y()));
+        return side > kHalf - wall_ && side < kHalf + 0.11 && std::abs(p.z()) < kHalf + 0.11;
+    }
 
  private:
     static constexpr double kHalf = 0.4;
@@ -149,8 +154,9 @@ TEST(ThinShells, areNoneWhereWallsAreThick) {
     for (const FreeSpace::Frontier& place : pot.frontier()) {
         const bool in = pot.isInside(place.centre.cast<double>());
         inside += in ? 1 : 0;
-        EXPECT_FALSE(in && shells.hold(place)) << place.centre.transpose();
-        within += !in && shells.hold(place) ? 1 : 0;
+        EXPECT_FALSE(!pot.isInWall(place.centre.cast<double>()) && shells.hold(place))
+            << place.centre.transpose();
+        within += shells.hold(place) ? 1 : 0;
     }
     EXPECT_LT(within, inside / 4);
     ASSERT_GT(inside, 100U) << "the test needs a part of the inside that was not seen";

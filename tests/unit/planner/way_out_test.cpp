@@ -55,10 +55,14 @@ int viewsToGetOut(unsigned seed, int firstColumn) {
     std::uniform_real_distribution<double> in(-1, 1);
     Pose pose = lookAt(Eigen::Vector3d(in(random), in(random), 0.5 * in(random)),
                        Eigen::Vector3d(2 * in(random), 2 * in(random), 0.3 * in(random)));
+    std::vector<Eigen::Vector3d> looked;
     for (int views = 1; views <= 12; ++views) {
         const View view = test::viewOf(pose, insideRoom, firstColumn);
         graph.merge(view);
         knowledge.update(view);
+        for (const Eigen::Vector3d& place : looked) {
+            knowledge.unseen().noteTry(place);
+        }
         knowledge.updateReach();
         if (knowledge.reached() > 1000) {
             return views;
@@ -68,6 +72,7 @@ int viewsToGetOut(unsigned seed, int firstColumn) {
             return 12;
         }
         pose = plan->path.back();
+        looked = plan->unknown;
     }
     return 12;
 }
@@ -78,6 +83,20 @@ TEST(WayOut, takesFewViewsThoughThePyramidIsNarrowerThanTheCamera) {
         EXPECT_LE(viewsToGetOut(seed, 0), 5);
         EXPECT_LE(viewsToGetOut(seed, 48), 6);
     }
+}
+
+TEST(WayOut, isNotLookedForInsideOfAnObjectsBox) {
+    PixelGraph graph(graphOptions());
+    PlannerOptions options;
+    options.surfaceBox = {-3, -3, -2, 3, 3, 2};
+    Knowledge knowledge(graph, limits(), options);
+    RiftPlanner planner;
+    const View view = test::viewOf(lookAt({0, 0, 0}, {1, 0, 0}), insideRoom);
+    graph.merge(view);
+    knowledge.update(view);
+    knowledge.updateReach();
+    ASSERT_LT(knowledge.reached(), 64U);
+    EXPECT_NO_THROW(planner.next(knowledge));
 }
 
 TEST(WayOut, isBlockedByWhatEqualsTheVoxelsAlongIt) {
@@ -124,6 +143,7 @@ TEST(WayOut, isBlockedByWhatEqualsTheVoxelsAlongIt) {
         EXPECT_TRUE(space.toBeLookedAt(from, to, 0.3).empty()) << "looked at in vain";
     }
     FreeSpace space(box, kVoxel);
+    EXPECT_FALSE(space.toBeLookedAt({0.5, 0, 0}, {0.5, 0, 0}, 0.3).empty()) << "a way of no length";
     space.addSurface({0.05, 0.05, 0.05});
     EXPECT_TRUE(space.toBeLookedAt({-0.5, 0, 0}, {0.5, 0, 0}, 0.3).empty()) << "surface";
     EXPECT_FALSE(space.toBeLookedAt({-0.5, 0.6, 0}, {0.5, 0.6, 0}, 0.3).empty());

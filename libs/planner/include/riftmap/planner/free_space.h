@@ -42,12 +42,13 @@ class FreeSpace {
     /// Free because the camera is there with its clearance.
     void declareFree(const Eigen::Vector3d& centre, double radius);
     /// What the pixels without a match show. With `sensor.exactDepth`: nothing up to the far limit,
-    /// proven where the part of the ray before the near limit, where surface has no match either,
-    /// is within the clearance or in voxels proven free: by declareFreeOutside(), or by earlier
-    /// views that had the whole voxel in their image, measured at every pixel. With
-    /// `backgroundIsFree` all others show nothing, too, as far as both cameras see, but for those
-    /// beside surface that is too near to be matched and those of a strip that one camera alone
-    /// sees: so far a pair of cameras matches what is there.
+    /// proven, but only where the part of the ray before the near limit, where surface has no match
+    /// either, is within the clearance or in voxels proven free: by declareFreeOutside(), or by
+    /// earlier views that had the whole voxel in their image, measured at every pixel. With
+    /// `backgroundIsFree` the others show nothing either, but for those beside surface that is too
+    /// near to be matched: with exact depth up to the far limit, else as far as both cameras see,
+    /// for so far a pair of cameras matches what is there, and not in a hole as narrow as a strip
+    /// that one camera alone sees.
     EmptyPixels emptyPixels(const View& view, const SensorModel& sensor,
                             bool backgroundIsFree) const;
     /// What a view saw through. Pixels that are proven empty count as measured; other empty ones

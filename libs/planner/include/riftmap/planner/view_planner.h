@@ -40,8 +40,9 @@ struct PlannerOptions {
     /// Surfaces lie in this box, the space around it is free: xmin ymin zmin xmax ymax zmax [m].
     /// Empty: nothing is known beforehand.
     std::vector<double> surfaceBox;
-    bool backgroundIsFree = false;  ///< pixels without a match show that nothing is there
-    std::uint64_t seed = 0;         ///< of the candidates; the program sets it
+    bool backgroundIsFree =
+        false;  ///< pixels without a match show that nothing is there, as far as both cameras see
+    std::uint64_t seed = 0;  ///< of the candidates; the program sets it
     void describe(OptionTable& table);
 };
 
@@ -60,7 +61,8 @@ class Knowledge {
     /// they do; false if they did before, or if the last look was less than 20 views ago and it is
     /// not `atTheEnd`.
     bool openPassages(bool atTheEnd);
-    /// Voxels of free space that the last updateReach() found the camera to fit in.
+    /// Clear voxels (their centre keeps the clearance, without passages) that the last
+    /// updateReach() found a way to.
     std::size_t reached() const { return reached_; }
     /// A place where the camera fits, and the way there.
     struct Place {
