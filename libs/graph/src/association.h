@@ -65,7 +65,9 @@ class Association {
     /// Slots of pages[which] in view.
     std::uint64_t slotsInView(std::uint32_t which) const { return inView_[which]; }
     /// Of the slots of pages[which] before the view [m].
-    const float* sigmas(std::uint32_t which) const { return &sigma_[std::size_t{which} * Page::kSize]; }
+    const float* sigmas(std::uint32_t which) const {
+        return &sigma_[std::size_t{which} * Page::kSize];
+    }
     /// The pixel that fits a candidate best, kNone where no pixel matched it.
     std::uint32_t bestPixel(std::uint32_t candidate) const {
         return static_cast<std::uint32_t>(claims[candidate].best);
