@@ -40,6 +40,12 @@ Eigen::Vector3d anyPerpendicular(const Eigen::Vector3d& n) {
     return n.cross(axis).normalized();
 }
 
+Eigen::Vector3d evenDirection(int i, int n) {
+    const double z = 1 - (2 * i + 1.0) / n;
+    const double r = std::sqrt(1 - z * z);
+    return {r * std::cos(2.399963 * i), r * std::sin(2.399963 * i), z};
+}
+
 Choice::Choice(Knowledge& knowledge, std::vector<Pose>& pool, ObjectMemory& memory)
     : k_(knowledge),
       pool_(pool),
@@ -303,9 +309,7 @@ void Choice::forEachInSight(const RiftRecord& record, bool anywhere, const F& f)
     const Eigen::Vector3d normal = record.cell.openNormal.cast<double>();
     for (int k = 0; k < kDirections; ++k) {
         const int i = k * 247 % kDirections;  // so that the first ones are from all sides, too
-        const double z = 1 - (2 * i + 1.0) / kDirections;
-        const double r = std::sqrt(1 - z * z);
-        const Eigen::Vector3d out(r * std::cos(2.399963 * i), r * std::sin(2.399963 * i), z);
+        const Eigen::Vector3d out = evenDirection(i, kDirections);
         if (step || normal.isZero() || out.dot(normal) > kFacing) {
             const auto eye = lookOut(record, out, anywhere);
             if (eye && !f(*eye)) {

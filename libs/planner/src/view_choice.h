@@ -21,6 +21,9 @@ struct Candidate {
 /// A unit vector at a right angle to `n`.
 Eigen::Vector3d anyPerpendicular(const Eigen::Vector3d& n);
 
+/// The i-th of n directions that are spread evenly over the sphere, on a spiral from up to down.
+Eigen::Vector3d evenDirection(int i, int n);
+
 /// One plan: makes candidates, scores them, picks.
 class Choice {
  public:

@@ -2,24 +2,12 @@
 // The first steps: what a camera sees is a pyramid, which near its tip is narrower than the room
 // that the camera itself takes.
 #include <algorithm>
-#include <cmath>
 #include <iterator>
 
 #include "riftmap/core/parallel.h"
 #include "view_choice.h"
 
 namespace riftmap {
-
-namespace {
-
-/// The i-th of n directions that are spread evenly, without one straight up or down.
-Eigen::Vector3d direction(int i, int n) {
-    const double z = 1 - (2 * i + 1.0) / n;
-    const double r = std::sqrt(1 - z * z);
-    return {r * std::cos(2.399963 * i), r * std::sin(2.399963 * i), z};
-}
-
-}  // namespace
 
 /// The unknown voxels that stand in the way of a camera that cannot leave its place, on the
 /// straight way out that has fewest of them; empty if there is none.
@@ -31,7 +19,7 @@ std::vector<Eigen::Vector3d> Choice::inTheWayOut() const {
     // So far that the pyramid is wide enough; less where the room is too small for that.
     for (const double length : {5.0, 3.5, 2.5}) {
         for (int i = 0; i < kWays; ++i) {
-            const Eigen::Vector3d to = eye + length * k_.clearance() * direction(i, kWays);
+            const Eigen::Vector3d to = eye + length * k_.clearance() * evenDirection(i, kWays);
             if (!k_.cameraBox().contains(to)) {
                 continue;
             }
@@ -78,7 +66,7 @@ std::optional<ViewPlan> Choice::wayOut() {
     constexpr int kViews = 200;
     for (const Eigen::Vector3d& eye : eyes) {
         for (int i = 0; i < kViews; ++i) {
-            add(eye, eye + direction(i, kViews));
+            add(eye, eye + evenDirection(i, kViews));
         }
     }
     std::vector<std::ptrdiff_t> freed(candidates_.size());
