@@ -193,9 +193,11 @@ void FreeSpace::updateClear(double clearance, const Eigen::AlignedBox3d& limits)
         }
     }
     clear_.resize(voxels_.size());
+    clearCount_ = 0;
     for (std::size_t i = 0; i < voxels_.size(); ++i) {
         clear_[i] =
             static_cast<std::uint8_t>(passable_[i] & allowed_[i] & (blockers_[i] == 0 ? 1 : 0));
+        clearCount_ += clear_[i];
     }
 }
 

@@ -94,7 +94,7 @@ void PlannerOptions::describe(OptionTable& table) {
     table.add("view_cost", viewCost, 0.01, 100, "m", "Cost of taking a view, as length of path");
     table.add("min_gain", minGain, 0, 1, "",
               "A view that promises less than this share of the surface known is not worth taking; "
-              "0 = 0.0007, with exact depth 0.0005");
+              "0 = 0.0007, with exact depth 0.0002");
     table.add("max_attempts", maxAttempts, 1, 100, "",
               "Different views of a tear that may fail before it is given up");
     table.add("unknown_weight", unknownWeight, 0, 100, "",
@@ -139,7 +139,9 @@ void Knowledge::update(const View& view) {
     camera_ = view.world_T_camera;
     sensor_ = SensorModel::of(view, limits_);
     const EmptyPixels empty = space_.emptyPixels(view, sensor_, options_.backgroundIsFree);
-    seenThrough_.add(view, empty);
+    // With exact depth they show nothing, but are no proof that the camera may fly there.
+    const bool isMore = sensor_.exactDepth && !options_.backgroundIsFree;
+    seenThrough_.add(view, isMore ? space_.emptyPixels(view, sensor_, true) : empty);
     summary_.update(*graph_, view, &seenThrough_);
     ledger_.update(summary_);
     // Surface that is seen in there counts all the same.
@@ -199,15 +201,16 @@ void Knowledge::updateReach() {
 bool Knowledge::openPassages(bool atTheEnd) {
     constexpr std::size_t kEvery = 20;  // [views] as a rule there are none, and a look takes time
     constexpr double kLeadOn = 1.002;   // less is a corner that voxels miss, and ways take longer
-    if (passages_ || (views_ < nextLook_ && !atTheEnd)) {
+    const double enough = kLeadOn * static_cast<double>(reached_);
+    if (passages_ || (views_ < nextLook_ && !atTheEnd) ||
+        static_cast<double>(space_.clearCount()) <= enough) {  // nowhere to lead to
         return false;
     }
     nextLook_ = views_ + kEvery;
-    const std::size_t before = reached_;
     passages_ = true;
     space_.forgetAll();
     updateReach();
-    passages_ = static_cast<double>(reached_) > kLeadOn * static_cast<double>(before);
+    passages_ = static_cast<double>(reached_) > enough;
     if (passages_) {
         ledger_.reopen(RiftState::kUnreachable);
         ledger_.reopen(RiftState::kDeferred);
@@ -260,7 +263,7 @@ std::optional<Knowledge::Place> Knowledge::placeAt(const Eigen::Vector3d& eye) c
 
 double Knowledge::minGain() const {
     // What exact depth promises is there if it can be seen at all.
-    constexpr double kExact = 5e-4, kNoisy = 7e-4;
+    constexpr double kExact = 2e-4, kNoisy = 7e-4;
     const double automatic = sensor_.exactDepth ? kExact : kNoisy;
     return (options_.minGain > 0 ? options_.minGain : automatic) * summary_.area();
 }

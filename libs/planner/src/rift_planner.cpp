@@ -474,7 +474,8 @@ std::optional<ViewPlan> Choice::make() {
         return c.score.gain < k_.minGain() || c.score.nearShare > 0.3;
     });
     const Candidate* b = best();
-    if ((b == nullptr || b->score.gain < 4 * k_.minGain()) && k_.openPassages(false)) {
+    constexpr double kLittle = 0.002;  // of the surface: worth a look for passages
+    if ((b == nullptr || b->score.gain < kLittle * k_.summary().area()) && k_.openPassages(false)) {
         return Choice(k_, pool_, memory_).make();
     }
     if (b != nullptr) {

@@ -45,6 +45,7 @@ struct Sums {
 
 constexpr int kParts = 4;  ///< of a cell, along each axis
 
+/// In SurfaceCell::parts.
 std::uint64_t partBit(const Eigen::Vector3i& part) {
     return std::uint64_t{1} << ((part.z() * kParts + part.y()) * kParts + part.x());
 }
@@ -209,6 +210,36 @@ const SurfaceCell* SurfaceSummary::find(std::uint64_t key) const {
         std::lower_bound(cells.begin(), cells.end(), key,
                          [](const SurfaceCell& a, std::uint64_t k) { return a.key < k; });
     return c != cells.end() && c->key == key ? &*c : nullptr;
+}
+
+bool SurfaceSummary::openTowards(const Eigen::Vector3f& place, const Eigen::Vector3f& eye) const {
+    constexpr float kFirst = 2.2F, kLast = 4 * kParts, kStep = 0.75F;  // [parts]
+    static_assert(kParts == 4 && kCellsPerSide == 8);
+    const Eigen::Vector3f start = place * (kParts / static_cast<float>(cell_));
+    const Eigen::Vector3f way = eye * (kParts / static_cast<float>(cell_)) - start;
+    const float end = std::min(kLast, way.norm());
+    const Eigen::Vector3f out = way.normalized();
+    std::uint64_t last = 0;  // block; no key is 0
+    auto block = blocks_.end();
+    for (float s = kFirst; s < end; s += kStep) {
+        const Eigen::Vector3i part = (start + s * out).array().floor().cast<int>();
+        const Eigen::Vector3i cell = part.unaryExpr([](int x) { return x >> 2; });
+        const std::uint64_t key = blockOf(pack(cell));
+        if (key != last) {
+            last = key;
+            block = blocks_.find(key);
+        }
+        if (block == blocks_.end()) {
+            continue;
+        }
+        const Eigen::Vector3i in = cell.unaryExpr([](int x) { return x & 7; });
+        const auto i =
+            static_cast<std::size_t>((in.z() * kCellsPerSide + in.y()) * kCellsPerSide + in.x());
+        if ((block->second.parts[i] & partBit(part - kParts * cell)) != 0) {
+            return false;
+        }
+    }
+    return true;
 }
 
 /// Keys of the blocks that lie within the resolution of a point of the view, of every second along
@@ -398,6 +429,11 @@ SurfaceSummary::Block SurfaceSummary::build(const PixelGraph& graph, std::uint64
                     block.positions.push_back(block.cells.back().position);
                 }
             }
+        }
+    }
+    if (!block.cells.empty()) {
+        for (const Sums& s : sums) {
+            block.parts.push_back(s.parts);
         }
     }
     return block;

@@ -135,8 +135,14 @@ ViewScorer::Benefit ViewScorer::benefit(const RiftRecord& record,
         facing += over * record.cell.outward.cast<double>();
     }
     const double coarseQuality = qualityOn(facing);
-    const double tornQuality =
-        record.cell.hidden > 0 ? qualityOn(record.cell.hiddenNormal.cast<double>()) : coarseQuality;
+    double tornQuality = coarseQuality;
+    if (record.cell.hidden > 0) {
+        tornQuality = qualityOn(record.cell.hiddenNormal.cast<double>());
+        if (tornQuality > 0 &&
+            !summary_->openTowards(record.cell.hiddenPosition, eye.cast<float>())) {
+            tornQuality = 0;
+        }
+    }
     // New surface is worth something from afar too; known surface gets better only from where the
     // view measures well.
     const double torn = newSurfaceShare(distance);

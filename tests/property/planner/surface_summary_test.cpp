@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <set>
+#include <vector>
 
 #include "random_scene.h"
 
@@ -63,6 +65,58 @@ std::size_t newIn(const Parts& now, const Parts& before) {
         count += known ? 0 : 1;
     }
     return count;
+}
+
+/// Whether a part lies on the line from a place to an eye, two parts to four cells from the place;
+/// nothing where rounding may decide.
+std::optional<bool> closed(const Parts& parts, const Eigen::Vector3d& place,
+                           const Eigen::Vector3d& eye) {
+    bool doubt = false;
+    for (double s = 2.2; s < std::min(16.0, (eye - place).norm() / kPart); s += 0.75) {
+        const Eigen::Vector3d p = place / kPart + s * (eye - place).normalized();
+        const Eigen::Vector3d whole = p.array().floor();
+        const bool atBorder = ((p - whole).array() - 0.5).abs().maxCoeff() > 0.5 - 1e-3;
+        const bool met = parts.count({static_cast<int>(whole.x()), static_cast<int>(whole.y()),
+                                      static_cast<int>(whole.z())}) > 0;
+        doubt = doubt || atBorder;
+        if (met && !atBorder) {
+            return true;
+        }
+    }
+    return doubt ? std::nullopt : std::optional(false);
+}
+
+TEST(SurfaceSummary, IsOpenTowardsAnEyeUnlessAPartIsOnTheWay) {
+    for (std::uint32_t seed = 1; seed <= 6; ++seed) {
+        SCOPED_TRACE("seed " + std::to_string(seed));
+        test::RandomScene scene(seed);
+        PixelGraph graph{GraphOptions()};
+        SurfaceSummary summary(kCell, kPart);
+        std::vector<Eigen::Vector3f> vertices;
+        for (const double y : {-0.5, 0.5}) {
+            const View view = scene.see(lookAt({0, y, 0}, {2.5, 0, 0}));
+            graph.merge(view);
+            summary.update(graph, view);
+        }
+        graph.forEachVertex([&](VertexId id) { vertices.push_back(graph.position(id)); });
+        const Parts parts = partsOf(summary);
+        std::array<std::size_t, 2> count{};
+        for (int i = 0; i < 3000; ++i) {
+            const Eigen::Vector3d near = vertices[scene.random() % vertices.size()].cast<double>() +
+                                         scene.place({-0.1, -0.1, -0.1}, {0.1, 0.1, 0.1});
+            // Some eyes are nearer than looks go.
+            const Eigen::Vector3d eye =
+                near + scene.place({-1, -1, -1}, {1, 1, 1}) * scene.uniform(0.05, 2.0);
+            const auto slow = closed(parts, near, eye);
+            if (slow) {
+                EXPECT_NE(summary.openTowards(near.cast<float>(), eye.cast<float>()), *slow)
+                    << near.transpose() << " to " << eye.transpose();
+                ++count[*slow ? 1 : 0];
+            }
+        }
+        EXPECT_GT(count[0], 500U);
+        EXPECT_GT(count[1], 500U);
+    }
 }
 
 TEST(SurfaceSummary, NewAreaIsThatOfPartsWithNoneBesideThem) {

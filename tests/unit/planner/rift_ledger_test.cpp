@@ -191,9 +191,9 @@ class BenefitOfATear : public testing::Test {
     }
     RiftRecord record;
     bool exact = false;
+    SurfaceSummary summary{0.08, 0.02};
 
  private:
-    SurfaceSummary summary{0.08, 0.02};
     RiftLedger ledger{0.02, 4};
     FreeSpace space{Eigen::AlignedBox3d(Eigen::Vector3d(-3, -3, -3), Eigen::Vector3d(3, 3, 3)),
                     0.1};
@@ -207,6 +207,24 @@ TEST_F(BenefitOfATear, liesWhereTheHiddenSurfaceFaces) {
     EXPECT_GT(area({-1, 0, 1}), 0.004);
     record.cell.hiddenNormal = {0, 0, 0.1F};  // two rims that face each other
     EXPECT_GT(area({-1, 0, 0}), 0.004);
+}
+
+TEST_F(BenefitOfATear, isNothingWhereAFoldIsInTheWay) {
+    PixelGraph graph{GraphOptions()};
+    const View view = test::viewOf(lookAt({0, 0, 0}, {1, 0, 0}), test::wall(2.0));
+    graph.merge(view);
+    summary.update(graph, view);
+    record.cell.openPosition = record.cell.hiddenPosition = {2.1F, 0, 0};
+    record.cell.hiddenNormal = {0, 1, 0};
+    const Eigen::Vector3d before(1.6, 1, 0);
+    const Eigen::Vector3d behind(2.6, 1, 0);
+    EXPECT_EQ(area(before), 0.0);
+    EXPECT_GT(area(behind), 0.004);
+    record.cell.coarse = 0.006F;  // as a cell it lies behind the wall, too, but by what is drawn
+    EXPECT_GT(area(before), 0.0);
+    record.cell.openPosition = record.cell.hiddenPosition = {2.4F, 0, 0};  // too far to be a fold
+    record.cell.coarse = 0;
+    EXPECT_GT(area(before), 0.004);
 }
 
 TEST_F(BenefitOfATear, leavesCoarseSurfaceItsOwnSide) {

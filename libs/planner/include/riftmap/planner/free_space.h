@@ -99,6 +99,8 @@ class FreeSpace {
     void forget(const Eigen::AlignedBox3d& changed);
     /// `fits` is to be asked again everywhere.
     void forgetAll() { fits_.clear(); }
+    /// Voxels that are clear after updateClear(), whether or not a way leads there.
+    std::size_t clearCount() const { return clearCount_; }
     bool isClear(const Eigen::Vector3d& point) const {
         const Eigen::Vector3i v = voxelOf(point);
         return inside(v) && clear_[index(v)] != 0;
@@ -178,7 +180,8 @@ class FreeSpace {
     std::vector<std::uint8_t> allowed_;  ///< 1 = inside the limits of updateClear()
     double clearance_ = -1;              ///< of updateClear()
     Eigen::AlignedBox3d limits_;
-    std::vector<std::uint8_t> clear_;    ///< 1 = the ball fits here
+    std::vector<std::uint8_t> clear_;  ///< 1 = the ball fits here
+    std::size_t clearCount_ = 0;
     std::vector<std::uint8_t> fits_;     ///< answers of `fits`: 0 not asked, 1 no, 2 yes
     std::vector<float> distance_;        ///< from the start [m]
     std::vector<std::uint32_t> parent_;  ///< voxel before it on the way
