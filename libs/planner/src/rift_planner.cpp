@@ -22,7 +22,6 @@ ViewScorer::Weights weightsFor(const Knowledge& k, const ObjectMemory& memory) {
         // Unseen surface counts where it may be (the frontier), so the rims of the surface seen
         // stand for holes that are smaller than that, and coarse surface is mostly covered. All so
         // that gains come true: predicted against measured on five objects.
-        weights.reach = 0.3;
         weights.coarse = 0.15;
         weights.unknown *= memory.frontier.share();
         weights.hidden = 0.65 * memory.tears.share();

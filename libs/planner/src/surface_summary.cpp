@@ -34,7 +34,7 @@ struct Sums {
     Eigen::Vector3d position = Eigen::Vector3d::Zero(), normal = Eigen::Vector3d::Zero();
     Eigen::Vector3d openPosition = Eigen::Vector3d::Zero(), outward = Eigen::Vector3d::Zero();
     Eigen::Vector3d tornNormal = Eigen::Vector3d::Zero(), coarseNormal = Eigen::Vector3d::Zero();
-    double jump = 0, doubt = 0, hidden = 0;
+    double doubt = 0, hidden = 0;
     Eigen::Vector3d hiddenPosition = Eigen::Vector3d::Zero();
     Eigen::Vector3d hiddenNormal = Eigen::Vector3d::Zero();
     std::uint32_t hides = 0;
@@ -53,10 +53,9 @@ std::uint64_t partBit(const Eigen::Vector3i& part) {
 /// From the neighbours towards the vertex and on: out of the surface seen so far.
 Eigen::Vector3d outwardAt(const PixelGraph& graph, VertexId id, const Vertex& v, Sums& sums) {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    graph.forEachEdge(id, [&](VertexId to, float weight, bool high) {
+    graph.forEachEdge(id, [&](VertexId to, float, bool high) {
         if (high) {
             ++sums.high;
-            sums.jump += static_cast<double>(weight);
         } else {
             sum += (v.position - graph.position(to)).cast<double>().normalized();
         }
@@ -138,7 +137,6 @@ SurfaceCell toCell(const Sums& s, std::uint64_t key, double cell) {
         if (normal.norm() > 1e-6) {
             c.openNormal = normal.normalized().cast<float>();
         }
-        c.jump = s.high > 0 ? static_cast<float>(s.jump / s.high) : 0.0F;
         c.rim = static_cast<float>(std::min(s.torn * spacing, 2.0 * cell));
         c.coarse = static_cast<float>(cell * cell * s.coarse / s.vertices);
         c.doubt = static_cast<float>(cell * cell * s.doubt / s.vertices);

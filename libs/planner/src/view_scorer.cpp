@@ -148,13 +148,8 @@ ViewScorer::Benefit ViewScorer::benefit(const RiftRecord& record,
     const double torn = newSurfaceShare(distance);
     const double coarse = std::clamp((1.6 * goodDepth_ - distance) / (0.6 * goodDepth_), 0.0, 1.0);
     const double vain = leftAfterTries(record);
-    const double cell = summary_->cellSize();
-    // What a gap hides goes on about as far beyond what was looked at as the step is deep.
-    const double reach = std::clamp(0.5 * static_cast<double>(record.cell.jump),
-                                    weights_.reach * cell, weights_.farthestReach * cell);
-    const double tornArea = weights_.hidden * static_cast<double>(record.cell.hidden) * reach /
-                                (kWidestGap * resolution_) +
-                            besideRim(record.cell);
+    const double tornArea =
+        weights_.hidden * static_cast<double>(record.cell.hidden) + besideRim(record.cell);
     const double coarseArea = weights_.coarse * static_cast<double>(record.cell.coarse);
     Benefit result;
     result.coarseArea = coarseQuality * vain * coarse * coarseArea;

@@ -33,7 +33,6 @@ struct SurfaceCell {
     /// surface, length at most 1 (short where the tear runs around).
     Eigen::Vector3f outward = Eigen::Vector3f::Zero();
     float rim = 0;     ///< length of the tear in this cell, about [m]
-    float jump = 0;    ///< mean length of the high edges across it [m]; 0 where none is left
     float coarse = 0;  ///< area sampled too sparsely or known too badly, about [m^2]
     /// Area that the tear may hide, counted from both its sides; 0 where `seen` was not given
     /// [m^2].

@@ -37,12 +37,9 @@ class ViewScorer {
         /// Good depths up to which new surface counts in full; 0: as far as it comes to lie within
         /// the resolution of where it is.
         double newSurfaceDepth = 1.5;
-        /// Of the widest gap, how far what it hides goes on, in cells ...
-        double reach = 1.5;
-        double farthestReach = 4.0;  ///< ... and beyond deep steps at most
-        double coarse = 0.35;        ///< of surface known better against surface known at all
-        double hidden = 1.5;         ///< of the area of the gaps beside tears
-        double doubt = 1.0;          ///< of area of an object that is probably out of place, 0 to 1
+        double coarse = 0.35;  ///< of surface known better against surface known at all
+        double hidden = 3.0;   ///< of the area of gaps: what they hide goes on behind them
+        double doubt = 1.0;    ///< of area of an object that is probably out of place, 0 to 1
         double vain = 0.8;  ///< what is left of the worth of a tear after a view that did not help
         /// The same where pixels beside it had no disparity: what did not match once will hardly
         /// match from elsewhere, while what was hidden may be seen from another side.
