@@ -282,6 +282,8 @@ ViewScore ViewScorer::scoreEvery(std::size_t stride, int rayStride,
     result.nearShare = nearShareOf(buffer);
     const StereoCamera& camera = sensor_.camera;
     const double cell = summary_->cellSize();
+    std::vector<std::uint64_t> all;
+    double seenWell = 0;  // [m^2] of openGain
     for (const BlockView* block : seen) {
         const std::size_t first = (block->firstOpen + stride - 1) / stride * stride;
         for (std::size_t i = first; i < block->lastOpen; i += stride) {
@@ -297,10 +299,16 @@ ViewScore ViewScorer::scoreEvery(std::size_t stride, int rayStride,
             }
             result.openGain += static_cast<double>(stride) * b.area;
             result.coarseGain += static_cast<double>(stride) * b.coarseArea;
+            all.push_back(record.cell.key);
             if (b.quality > 0.5) {
                 result.cells.push_back(record.cell.key);
+                seenWell += static_cast<double>(stride) * b.area;
             }
         }
+    }
+    // A view that lives on what it sees badly is a try of that, or it might be taken for ever.
+    if (seenWell < 0.5 * result.openGain) {
+        result.cells = std::move(all);
     }
     std::sort(result.cells.begin(), result.cells.end());
     const double side = static_cast<double>(kPixels * rayStride) / camera.fx;

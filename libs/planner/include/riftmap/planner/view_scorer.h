@@ -25,7 +25,9 @@ struct ViewScore {
     /// Of the field of view that is nearer than the near limit; 0 with exact depth, which nothing
     /// nearer disturbs.
     double nearShare = 0;
-    std::vector<std::uint64_t> cells;  ///< open cells that it sees well, ascending
+    /// Open cells that it sees well, ascending; all that promise something if the others promise
+    /// more than half of `openGain`: the view is a try of those.
+    std::vector<std::uint64_t> cells;
 };
 
 /// Predicts views: the cells of the summary are drawn into a small depth image, which hides what
