@@ -139,9 +139,7 @@ void Knowledge::update(const View& view) {
     camera_ = view.world_T_camera;
     sensor_ = SensorModel::of(view, limits_);
     const EmptyPixels empty = space_.emptyPixels(view, sensor_, options_.backgroundIsFree);
-    // With exact depth they show nothing, but are no proof that the camera may fly there.
-    const bool isMore = sensor_.exactDepth && !options_.backgroundIsFree;
-    seenThrough_.add(view, isMore ? space_.emptyPixels(view, sensor_, true) : empty);
+    seenThrough_.add(view, empty);
     summary_.update(*graph_, view, &seenThrough_);
     ledger_.update(summary_);
     // Surface that is seen in there counts all the same.

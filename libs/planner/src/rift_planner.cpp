@@ -253,6 +253,9 @@ std::optional<ViewPlan> Choice::planFor(const Candidate& c) const {
     plan.coarseGain = c.score.coarseGain;
     plan.unknownGain = c.score.unknownGain;
     plan.cells = c.score.cells;
+    // Or a view that was in vain would leave no trace, and might be taken for ever.
+    plan.cells.insert(plan.cells.end(), c.score.badlySeen.begin(), c.score.badlySeen.end());
+    std::sort(plan.cells.begin(), plan.cells.end());
     plan.unknown = k_.surfaceBox() ? frontierSeen(c.pose) : scorer_.unknownSeen(c.pose);
     if (plan.path.empty()) {
         return std::nullopt;
@@ -409,6 +412,9 @@ std::optional<ViewPlan> Choice::lastResorts() {
             reachable = !candidates_.empty() || inRange(p);
         }
         const bool visible = !candidates_.empty();
+        std::erase_if(candidates_, [&](const Candidate& c) {
+            return scorer_.benefit(*record, c.pose.translation).area <= 0;
+        });
         if (candidates_.size() > kViews) {
             std::stable_sort(candidates_.begin(), candidates_.end(),
                              [&](const Candidate& a, const Candidate& b) {

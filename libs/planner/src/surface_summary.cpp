@@ -221,8 +221,7 @@ bool SurfaceSummary::openTowards(const Eigen::Vector3f& place, const Eigen::Vect
     auto block = blocks_.end();
     for (float s = kFirst; s < end; s += kStep) {
         const Eigen::Vector3i part = (start + s * out).array().floor().cast<int>();
-        const Eigen::Vector3i cell = part.unaryExpr([](int x) { return x >> 2; });
-        const std::uint64_t key = blockOf(pack(cell));
+        const std::uint64_t key = pack(part.unaryExpr([](int x) { return x >> 5; }));
         if (key != last) {
             last = key;
             block = blocks_.find(key);
@@ -230,6 +229,7 @@ bool SurfaceSummary::openTowards(const Eigen::Vector3f& place, const Eigen::Vect
         if (block == blocks_.end()) {
             continue;
         }
+        const Eigen::Vector3i cell = part.unaryExpr([](int x) { return x >> 2; });
         const Eigen::Vector3i in = cell.unaryExpr([](int x) { return x & 7; });
         const auto i =
             static_cast<std::size_t>((in.z() * kCellsPerSide + in.y()) * kCellsPerSide + in.x());
@@ -430,8 +430,10 @@ SurfaceSummary::Block SurfaceSummary::build(const PixelGraph& graph, std::uint64
         }
     }
     if (!block.cells.empty()) {
+        constexpr std::uint32_t kLeast = 3;  // [vertices] fewer may be noise
+        block.parts.reserve(sums.size());
         for (const Sums& s : sums) {
-            block.parts.push_back(s.parts);
+            block.parts.push_back(s.vertices >= kLeast ? s.parts : 0);
         }
     }
     return block;

@@ -152,11 +152,12 @@ ViewScorer::Benefit ViewScorer::benefit(const RiftRecord& record,
         weights_.hidden * static_cast<double>(record.cell.hidden) + besideRim(record.cell);
     const double coarseArea = weights_.coarse * static_cast<double>(record.cell.coarse);
     Benefit result;
-    result.coarseArea = coarseQuality * vain * coarse * coarseArea;
-    result.area = tornQuality * vain * torn * tornArea + result.coarseArea;
-    result.quality = tornArea > 0.3 * coarseArea ? tornQuality * torn : coarseQuality * coarse;
     result.torn = tornQuality * vain * torn;
     result.coarse = coarseQuality * vain * coarse;
+    result.coarseArea = result.coarse * coarseArea;
+    result.area = result.torn * tornArea + result.coarseArea;
+    result.quality = result.torn * tornArea > 0.3 * result.coarseArea ? tornQuality * torn
+                                                                      : coarseQuality * coarse;
     return result;
 }
 
@@ -282,7 +283,6 @@ ViewScore ViewScorer::scoreEvery(std::size_t stride, int rayStride,
     result.nearShare = nearShareOf(buffer);
     const StereoCamera& camera = sensor_.camera;
     const double cell = summary_->cellSize();
-    std::vector<std::uint64_t> all;
     double seenWell = 0;  // [m^2] of openGain
     for (const BlockView* block : seen) {
         const std::size_t first = (block->firstOpen + stride - 1) / stride * stride;
@@ -299,18 +299,15 @@ ViewScore ViewScorer::scoreEvery(std::size_t stride, int rayStride,
             }
             result.openGain += static_cast<double>(stride) * b.area;
             result.coarseGain += static_cast<double>(stride) * b.coarseArea;
-            all.push_back(record.cell.key);
-            if (b.quality > 0.5) {
-                result.cells.push_back(record.cell.key);
-                seenWell += static_cast<double>(stride) * b.area;
-            }
+            const bool well = b.quality > 0.5;
+            (well ? result.cells : result.badlySeen).push_back(record.cell.key);
+            seenWell += well ? static_cast<double>(stride) * b.area : 0.0;
         }
     }
-    // A view that lives on what it sees badly is a try of that, or it might be taken for ever.
-    if (seenWell < 0.5 * result.openGain) {
-        result.cells = std::move(all);
-    }
     std::sort(result.cells.begin(), result.cells.end());
+    if (seenWell >= 0.5 * result.openGain) {
+        result.badlySeen.clear();
+    }
     const double side = static_cast<double>(kPixels * rayStride) / camera.fx;
     forEachUnknown(world_T_camera, buffer, rayStride, [&](const Eigen::Vector3d&, double depth) {
         result.unknownGain += side * side * depth * depth * newSurfaceShare(depth);

@@ -175,10 +175,17 @@ TEST_P(ScorerTwin, seesTheCellsThatNothingHides) {
             doubtful += sight == Sight::kRounding ? 1 : 0;
             sure += sight == Sight::kYes ? b.area : 0.0;
             possible += sight != Sight::kNo ? b.area : 0.0;
-            if (sight != Sight::kRounding && livesOnIt) {
-                EXPECT_EQ(
-                    std::binary_search(score.cells.begin(), score.cells.end(), record->cell.key),
-                    (*livesOnIt ? isWell(b) : b.area > 0) && sight == Sight::kYes)
+            if (sight == Sight::kRounding) {
+                continue;
+            }
+            const std::uint64_t key = record->cell.key;
+            EXPECT_EQ(std::binary_search(score.cells.begin(), score.cells.end(), key),
+                      isWell(b) && sight == Sight::kYes)
+                << record->cell.openPosition.transpose();
+            if (livesOnIt) {
+                const auto& rest = score.badlySeen;
+                EXPECT_EQ(std::find(rest.begin(), rest.end(), key) != rest.end(),
+                          !*livesOnIt && !isWell(b) && b.area > 0 && sight == Sight::kYes)
                     << record->cell.openPosition.transpose();
             }
         }

@@ -63,7 +63,8 @@ class SurfaceSummary {
         std::vector<SurfaceCell> cells;  ///< ascending in key
         /// Their positions once more, side by side: all that drawing them takes.
         std::vector<Eigen::Vector3f> positions;
-        /// SurfaceCell::parts of all its cubes, z by y by x; empty if none holds a vertex.
+        /// SurfaceCell::parts of all its cubes with 3 vertices or more, z by y by x; 0 for the
+        /// others.
         std::vector<std::uint64_t> parts;
     };
     /// All blocks by key, in ascending order.
@@ -75,10 +76,10 @@ class SurfaceSummary {
     const std::vector<Block>& former() const { return former_; }
     /// Key of the block of a cell.
     static std::uint64_t blockOf(std::uint64_t cell);
-    /// False if something known stands close before a place, as seen from `eye`: if a part of a
-    /// cell (SurfaceCell::parts) that holds a vertex lies on the line between them, no farther than
-    /// four cells from the place. The first two parts on the line do not count, for there stands
-    /// the rim that the place lies beside. About 0.2 us.
+    /// False if something known stands close before a place, as seen from `eye`: if a part
+    /// (Block::parts) that holds a vertex is met on the line between them, at places 0.75 of its
+    /// edge apart, no farther than four cells from the place. The first 2.2 edges of a part do not
+    /// count, for there stands the rim that the place lies beside. About 0.2 us.
     bool openTowards(const Eigen::Vector3f& place, const Eigen::Vector3f& eye) const;
     /// Nothing if the cell holds no vertex.
     const SurfaceCell* find(std::uint64_t key) const;

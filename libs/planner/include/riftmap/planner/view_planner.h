@@ -58,8 +58,8 @@ class Knowledge {
     /// Looks for passages too narrow for voxels (a door, the space between a wall and the end of
     /// the workspace), by the surface itself. If they lead on, to 0.2 % more voxels at least, takes
     /// them into account from then on, and opens again the tears that were unreachable. True if
-    /// they do; false if they did before, or if the last look was less than 20 views ago and it is
-    /// not `atTheEnd`.
+    /// they do; false if they did before, if there are no 0.2 % more clear voxels anywhere (no look
+    /// is taken then), or if the last look was less than 20 views ago and it is not `atTheEnd`.
     bool openPassages(bool atTheEnd);
     /// Clear voxels (their centre keeps the clearance, without passages) that the last
     /// updateReach() found a way to.

@@ -25,9 +25,10 @@ struct ViewScore {
     /// Of the field of view that is nearer than the near limit; 0 with exact depth, which nothing
     /// nearer disturbs.
     double nearShare = 0;
-    /// Open cells that it sees well, ascending; all that promise something if the others promise
-    /// more than half of `openGain`: the view is a try of those.
-    std::vector<std::uint64_t> cells;
+    std::vector<std::uint64_t> cells;  ///< open cells that it sees well, ascending
+    /// Those that it sees badly, in no order, if they promise more than half of `openGain`: the
+    /// view lives on them, and is a try of them.
+    std::vector<std::uint64_t> badlySeen;
 };
 
 /// Predicts views: the cells of the summary are drawn into a small depth image, which hides what
