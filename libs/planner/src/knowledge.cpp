@@ -94,7 +94,7 @@ void PlannerOptions::describe(OptionTable& table) {
     table.add("view_cost", viewCost, 0.01, 100, "m", "Cost of taking a view, as length of path");
     table.add("min_gain", minGain, 0, 1, "",
               "A view that promises less than this share of the surface known is not worth taking; "
-              "0 = 0.0006, with exact depth 0.0001");
+              "0 = 0.0007, with exact depth 0.0001");
     table.add("max_attempts", maxAttempts, 1, 100, "",
               "Different views of a tear that may fail before it is given up");
     table.add("unknown_weight", unknownWeight, 0, 100, "",
@@ -261,7 +261,7 @@ std::optional<Knowledge::Place> Knowledge::placeAt(const Eigen::Vector3d& eye) c
 
 double Knowledge::minGain() const {
     // What exact depth promises is there if it can be seen at all.
-    constexpr double kExact = 1e-4, kNoisy = 6e-4;
+    constexpr double kExact = 1e-4, kNoisy = 7e-4;
     const double automatic = sensor_.exactDepth ? kExact : kNoisy;
     return (options_.minGain > 0 ? options_.minGain : automatic) * summary_.area();
 }
