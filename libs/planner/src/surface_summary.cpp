@@ -231,9 +231,10 @@ bool SurfaceSummary::openTowards(const Eigen::Vector3f& place, const Eigen::Vect
         }
         const Eigen::Vector3i cell = part.unaryExpr([](int x) { return x >> 2; });
         const Eigen::Vector3i in = cell.unaryExpr([](int x) { return x & 7; });
-        const auto i =
-            static_cast<std::size_t>((in.z() * kCellsPerSide + in.y()) * kCellsPerSide + in.x());
-        if ((block->second.parts[i] & partBit(part - kParts * cell)) != 0) {
+        const std::ptrdiff_t i =
+            (std::ptrdiff_t{in.z()} * kCellsPerSide + in.y()) * kCellsPerSide + in.x();
+        if ((block->second.parts[static_cast<std::size_t>(i)] & partBit(part - kParts * cell)) !=
+            0) {
             return false;
         }
     }
