@@ -162,9 +162,8 @@ void Knowledge::update(const View& view) {
 /// Where the surface is, as far as the last view changed it.
 void Knowledge::updateSurface(FreeSpace& space) const {
     const auto forEachPiece = [](const SurfaceSummary::Block& block, const auto& f) {
-        constexpr std::uint32_t kLeast = 3;  // [vertices] fewer may be noise
         for (const SurfaceCell& cell : block.cells) {
-            if (cell.vertices >= kLeast) {
+            if (cell.vertices >= SurfaceSummary::kLeastVertices) {
                 f(cell.position.cast<double>());
             }
         }

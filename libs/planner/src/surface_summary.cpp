@@ -210,6 +210,12 @@ const SurfaceCell* SurfaceSummary::find(std::uint64_t key) const {
     return c != cells.end() && c->key == key ? &*c : nullptr;
 }
 
+/// Of a cell, counted from the block's corner, in lists of all its cells.
+std::size_t SurfaceSummary::indexInBlock(const Eigen::Vector3i& cell) {
+    const std::ptrdiff_t row = std::ptrdiff_t{cell.z()} * kCellsPerSide + cell.y();
+    return static_cast<std::size_t>(row * kCellsPerSide + cell.x());
+}
+
 bool SurfaceSummary::openTowards(const Eigen::Vector3f& place, const Eigen::Vector3f& eye) const {
     constexpr float kFirst = 2.2F, kLast = 4 * kParts, kStep = 0.75F;  // [parts]
     static_assert(kParts == 4 && kCellsPerSide == 8);
@@ -231,10 +237,7 @@ bool SurfaceSummary::openTowards(const Eigen::Vector3f& place, const Eigen::Vect
         }
         const Eigen::Vector3i cell = part.unaryExpr([](int x) { return x >> 2; });
         const Eigen::Vector3i in = cell.unaryExpr([](int x) { return x & 7; });
-        const std::ptrdiff_t i =
-            (std::ptrdiff_t{in.z()} * kCellsPerSide + in.y()) * kCellsPerSide + in.x();
-        if ((block->second.parts[static_cast<std::size_t>(i)] & partBit(part - kParts * cell)) !=
-            0) {
+        if ((block->second.parts[indexInBlock(in)] & partBit(part - kParts * cell)) != 0) {
             return false;
         }
     }
@@ -373,10 +376,7 @@ SurfaceSummary::Block SurfaceSummary::build(const PixelGraph& graph, std::uint64
                            ? SeenThrough::Views()
                            : seen->into(Eigen::AlignedBox3d(min - margin, max + margin));
     std::vector<Sums> sums(std::size_t{n} * n * n);
-    const auto sumsAt = [&](int x, int y, int z) -> Sums& {
-        const std::ptrdiff_t i = (std::ptrdiff_t{z} * n + y) * n + x;
-        return sums[static_cast<std::size_t>(i)];
-    };
+    const auto sumsAt = [&](int x, int y, int z) -> Sums& { return sums[indexInBlock({x, y, z})]; };
     graph.forEachVertexIn(min.cast<float>(), max.cast<float>(), [&](VertexId id) {
         const Vertex v = graph.vertex(id);
         const Eigen::Vector3d p = v.position.cast<double>();
@@ -431,10 +431,9 @@ SurfaceSummary::Block SurfaceSummary::build(const PixelGraph& graph, std::uint64
         }
     }
     if (!block.cells.empty()) {
-        constexpr std::uint32_t kLeast = 3;  // [vertices] fewer may be noise
         block.parts.reserve(sums.size());
         for (const Sums& s : sums) {
-            block.parts.push_back(s.vertices >= kLeast ? s.parts : 0);
+            block.parts.push_back(s.vertices >= kLeastVertices ? s.parts : 0);
         }
     }
     return block;

@@ -17,8 +17,7 @@ Eigen::Vector3i around(int i) {
 }
 
 constexpr int kAround = 27;
-constexpr int kPieceBits = 2;                ///< a piece of the frontier: 4 voxels along each axis
-constexpr std::uint32_t kLeastVertices = 3;  // as in the free space: fewer may be noise
+constexpr int kPieceBits = 2;  ///< a piece of the frontier: 4 voxels along each axis
 
 }  // namespace
 
@@ -27,7 +26,7 @@ ThinShells::ThinShells(const FreeSpace& space, const SurfaceSummary& summary,
     : origin_(space.box().min()), voxel_(space.voxelSize()) {
     for (const auto& [key, block] : summary.blocks()) {
         for (const SurfaceCell& cell : block.cells) {
-            if (cell.vertices < kLeastVertices) {
+            if (cell.vertices < SurfaceSummary::kLeastVertices) {
                 continue;
             }
             Surface& s = surface_[SurfaceSummary::keyAt(voxelOf(cell.position.cast<double>()))];

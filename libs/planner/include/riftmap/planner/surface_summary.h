@@ -53,6 +53,9 @@ class SurfaceSummary {
     /// be known [m]; both > 0.
     SurfaceSummary(double cell, double resolution);
 
+    /// Cells with fewer vertices may be noise: they hide nothing and stand in no way.
+    static constexpr std::uint32_t kLeastVertices = 3;
+
     double cellSize() const { return cell_; }
     /// Sums up anew all blocks of cells that this view has surface in or looks through. `seen`:
     /// what all views saw through, for `hidden`.
@@ -63,7 +66,7 @@ class SurfaceSummary {
         std::vector<SurfaceCell> cells;  ///< ascending in key
         /// Their positions once more, side by side: all that drawing them takes.
         std::vector<Eigen::Vector3f> positions;
-        /// SurfaceCell::parts of all its cubes with 3 vertices or more, z by y by x; 0 for the
+        /// SurfaceCell::parts of all its cubes with kLeastVertices, z by y by x; 0 for the
         /// others.
         std::vector<std::uint64_t> parts;
     };
@@ -106,6 +109,7 @@ class SurfaceSummary {
     Block build(const PixelGraph& graph, std::uint64_t blockKey, const SeenThrough* seen) const;
     std::vector<std::uint64_t> blocksSeen(const View& view) const;
     std::size_t newParts(const Block& now) const;
+    static std::size_t indexInBlock(const Eigen::Vector3i& cell);
 
     double cell_, resolution_;
     std::map<std::uint64_t, Block> blocks_;
