@@ -403,7 +403,7 @@ std::optional<ViewPlan> Choice::lastResorts() {
         }
         const Eigen::Vector3d p = record->cell.openPosition.cast<double>();
         std::erase_if(candidates_, [&](const Candidate& c) {
-            return scorer_.benefit(*record, c.pose.translation).quality < 0.1 ||
+            return scorer_.benefit(*record, c.pose).quality < 0.1 ||
                    !lineOfSight(c.pose.translation, p);
         });
         bool reachable = true;
@@ -413,13 +413,13 @@ std::optional<ViewPlan> Choice::lastResorts() {
         }
         const bool visible = !candidates_.empty();
         std::erase_if(candidates_, [&](const Candidate& c) {
-            return scorer_.benefit(*record, c.pose.translation).area <= 0;
+            return scorer_.benefit(*record, c.pose).area <= 0;
         });
         if (candidates_.size() > kViews) {
             std::stable_sort(candidates_.begin(), candidates_.end(),
                              [&](const Candidate& a, const Candidate& b) {
-                                 return scorer_.benefit(*record, a.pose.translation).area >
-                                        scorer_.benefit(*record, b.pose.translation).area;
+                                 return scorer_.benefit(*record, a.pose).area >
+                                        scorer_.benefit(*record, b.pose).area;
                              });
             candidates_.resize(kViews);
         }

@@ -14,6 +14,7 @@ SensorModel SensorModel::of(const View& view, const PlatformLimits& limits) {
     model.nearLimit = limits.nearLimit;
     model.clearance = limits.clearance;
     model.exactDepth = limits.exactDepth;
+    model.matched = limits.matched;
     if (std::isfinite(view.disparity.maxDisparity)) {
         model.nearLimit = std::max(
             model.nearLimit, view.camera.depth(static_cast<double>(view.disparity.maxDisparity)));

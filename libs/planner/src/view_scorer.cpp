@@ -112,8 +112,20 @@ double ViewScorer::besideRim(const SurfaceCell& cell) const {
     return kWidth * static_cast<double>(cell.rim);
 }
 
+/// Whether nothing close before what the cell hides is in the way of the cameras: of both, but for
+/// exact depth, which needs no partner.
+bool ViewScorer::openTo(const SurfaceCell& cell, const Pose& world_T_camera) const {
+    const auto open = [&](const Eigen::Vector3d& eye) {
+        return summary_->openTowards(cell.hiddenPosition, eye.cast<float>());
+    };
+    return open(world_T_camera.translation) &&
+           (sensor_.exactDepth ||
+            open(world_T_camera * Eigen::Vector3d(sensor_.camera.baseline, 0, 0)));
+}
+
 ViewScorer::Benefit ViewScorer::benefit(const RiftRecord& record,
-                                        const Eigen::Vector3d& eye) const {
+                                        const Pose& world_T_camera) const {
+    const Eigen::Vector3d& eye = world_T_camera.translation;
     if (RiftLedger::tried(record, eye)) {
         return {};
     }
@@ -122,9 +134,9 @@ ViewScorer::Benefit ViewScorer::benefit(const RiftRecord& record,
     const auto qualityOn = [&](const Eigen::Vector3d& facing) {
         constexpr double kClear = 0.3;  // a shorter mean is of normals that cancel: any side may do
         const double angle = facing.norm() > kClear ? ray.dot(facing.normalized()) / distance : 0.6;
-        // Exact depth is as good at flat angles; matching is not.
-        return sensor_.exactDepth ? std::clamp((angle - 0.15) / 0.1, 0.0, 1.0)
-                                  : std::clamp((angle - 0.2) / 0.35, 0.0, 1.0);
+        // Matching is worse at flat angles.
+        return !sensor_.matched ? std::clamp((angle - 0.15) / 0.1, 0.0, 1.0)
+                                : std::clamp((angle - 0.2) / 0.35, 0.0, 1.0);
     };
     // What a gap hides faces as the gap does. At other silhouettes the surface bends away over the
     // rim: what is to be seen faces outwards too, the more so if views from where the rim's own
@@ -138,8 +150,7 @@ ViewScorer::Benefit ViewScorer::benefit(const RiftRecord& record,
     double tornQuality = coarseQuality;
     if (record.cell.hidden > 0) {
         tornQuality = qualityOn(record.cell.hiddenNormal.cast<double>());
-        if (tornQuality > 0 &&
-            !summary_->openTowards(record.cell.hiddenPosition, eye.cast<float>())) {
+        if (tornQuality > 0 && !openTo(record.cell, world_T_camera)) {
             tornQuality = 0;
         }
     }
@@ -231,9 +242,9 @@ void ViewScorer::forEachUnknown(const Pose& world_T_camera, const DepthBuffer& b
     }
 }
 
-/// Matching makes surface up where all is nearer than its range; exact depth only misses it.
+/// Matching makes surface up where all is nearer than its range; other depth only misses it.
 double ViewScorer::nearShareOf(const DepthBuffer& buffer) const {
-    if (sensor_.exactDepth) {
+    if (!sensor_.matched) {
         return 0;
     }
     const int firstColumn = sensor_.firstColumn / kPixels;
@@ -293,7 +304,7 @@ ViewScore ViewScorer::scoreEvery(std::size_t stride, int rayStride,
             if (!visible(buffer, p, static_cast<float>(2.0 * cell))) {
                 continue;
             }
-            const Benefit b = benefit(record, world_T_camera.translation);
+            const Benefit b = benefit(record, world_T_camera);
             if (b.area <= 0) {
                 continue;
             }
@@ -381,7 +392,7 @@ ViewScorer::Seen ViewScorer::sights(const Pose& world_T_camera) const {
                 rotation * (cell.hidden > 0 ? cell.hiddenPosition : cell.openPosition) +
                 translation;
             if (visible(buffer, p, margin)) {
-                const Benefit b = benefit(*open_[i], world_T_camera.translation);
+                const Benefit b = benefit(*open_[i], world_T_camera);
                 put(2 * i, b.torn);
                 put(2 * i + 1, b.coarse);
             }

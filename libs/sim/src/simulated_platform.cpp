@@ -384,6 +384,7 @@ PlatformLimits SimulatedPlatform::limits() const {
     limits.nearLimit = parts_->options.camera.nearLimit();
     limits.farLimit = parts_->options.camera.farLimit;
     limits.exactDepth = parts_->options.noise.level == NoiseOptions::Level::kN0;
+    limits.matched = parts_->options.noise.level == NoiseOptions::Level::kN4;
     return limits;
 }
 

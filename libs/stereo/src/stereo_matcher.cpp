@@ -91,6 +91,9 @@ void StereoOptions::describe(OptionTable& table) {
               "Standard deviation of an image sample; 0: measured in every left image.");
     table.add("sigma_d", sigmaGiven, 0.001, 10.0, "px",
               "Standard deviation of a given disparity that comes without one.");
+    table.add("facet_radius", facetRadius, 0, 7, "px",
+              "Given disparities whose noise is independent from pixel to pixel are smoothed over "
+              "so much to each side, where the surface is smooth; 0: not.");
     table.add("max_depth_sigma", maxDepthSigma, 0.0, 100.0, "m",
               "Pixels whose depth is known worse (standard deviation) show free space, but are no "
               "surface of the map; 0: no limit.");

@@ -58,6 +58,7 @@ View ViewBuilder::build(const StereoObservation& observation) {
         view.disparity = *observation.disparity;
         requireSize(view.disparity.width, view.disparity.height, view.camera, "given disparity");
         fillMissingSigma(view.disparity, options_.sigmaGiven);
+        facets_.apply(view.disparity, options_.facetRadius);
     } else if (matcher_) {
         requireSize(observation.left.cols, observation.left.rows, view.camera, "left image");
         matcher_->compute(observation.left, observation.right, view.disparity);

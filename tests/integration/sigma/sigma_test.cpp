@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The standard deviation that comes with a disparity is the one that its error has: error / sigma
 // of the correct matches (within 1 px of the truth) deviates by 0.8 to 1.25, whatever the noise of
-// the images, on real pairs and on rendered ones.
+// the images, on real pairs and on rendered ones; so does that of noisy depth after smoothing.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -14,8 +14,10 @@
 #include <string>
 
 #include "middlebury.h"
+#include "riftmap/sim/simulated_platform.h"
 #include "riftmap/sim/stereo_renderer.h"
 #include "riftmap/stereo/paper_matcher.h"
+#include "riftmap/stereo/view_builder.h"
 
 namespace riftmap {
 namespace {
@@ -124,6 +126,46 @@ void addView(WorldOptions::Name name, double sensorNoise, Deviation& interior) {
                 -ray.dot(Eigen::Vector3d(n[0], n[1], n[2])) > kCosine) {
                 interior.add(error / static_cast<double>(found.sigma[found.index(c, r)]));
             }
+        }
+    }
+}
+
+/// Depth with noise of its own at each pixel, smoothed: of all pixels of a view.
+Deviation ofNoisyDepth(WorldOptions::Name name, double sigma) {
+    WorldOptions worldOptions;
+    worldOptions.name = name;
+    const World world = makeWorld(worldOptions);
+    const RayCaster caster(world.mesh);
+    const CameraOptions rig;
+    const StereoRenderer renderer(world, caster, rig, RenderOptions());
+    const Pose pose = world.starts.front().pose();
+    const Truth truth = renderer.truth(pose, false, true);
+    NoiseOptions noise;
+    noise.level = NoiseOptions::Level::kN3;
+    noise.sigmaD = 0;
+    const DisparityImage exact = exactDisparity(truth, rig, noise, 1);
+    noise.sigmaD = sigma;
+    StereoObservation observation = observe(renderer, rig, noise, pose, 1);
+    const View view = ViewBuilder(StereoOptions()).build(observation);
+    Deviation all;
+    for (std::size_t i = 0; i < exact.disparity.size(); ++i) {
+        if (exact.disparity[i] < kNoDisparity && view.disparity.disparity[i] < kNoDisparity) {
+            all.add(static_cast<double>(view.disparity.disparity[i] - exact.disparity[i]) /
+                    static_cast<double>(view.disparity.sigma[i]));
+        }
+    }
+    return all;
+}
+
+TEST(SigmaOfNoisyDepth, IsThatOfTheErrorAfterSmoothing) {
+    for (const auto world : {WorldOptions::Name::kRoom, WorldOptions::Name::kRooms,
+                             WorldOptions::Name::kSculpture, WorldOptions::Name::kCourtyard}) {
+        for (const double sigma : {0.05, 0.25, 0.5}) {
+            const Deviation all = ofNoisyDepth(world, sigma);
+            std::cout << "depth, " << sigma << " px: " << all.value() << "\n";
+            EXPECT_GT(all.n, 1000);
+            EXPECT_GE(all.value(), kLeast) << sigma;
+            EXPECT_LE(all.value(), kMost) << sigma;
         }
     }
 }

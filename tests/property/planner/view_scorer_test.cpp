@@ -138,7 +138,7 @@ std::optional<bool> livesOnWhatItSeesWell(const ViewScorer& scorer, const SlowSi
     double sure = 0;
     double possible = 0;
     for (const RiftRecord* record : scorer.open()) {
-        const ViewScorer::Benefit b = scorer.benefit(*record, pose.translation);
+        const ViewScorer::Benefit b = scorer.benefit(*record, pose);
         const Sight sight = isWell(b) ? slow.of(record->cell) : Sight::kNo;
         sure += sight == Sight::kYes ? b.area : 0.0;
         possible += sight != Sight::kNo ? b.area : 0.0;
@@ -168,7 +168,7 @@ TEST_P(ScorerTwin, seesTheCellsThatNothingHides) {
         double sure = 0;
         double possible = 0;
         for (const RiftRecord* record : scorer.open()) {
-            const ViewScorer::Benefit b = scorer.benefit(*record, pose.translation);
+            const ViewScorer::Benefit b = scorer.benefit(*record, pose);
             const Sight sight = slow.of(record->cell);
             seen += sight == Sight::kYes ? 1 : 0;
             hidden += sight == Sight::kNo ? 1 : 0;
@@ -221,7 +221,7 @@ TEST_P(ScorerTwin, anEstimateIsTheSumOfASample) {
         double possible = 0;
         double squares = 0;
         for (std::size_t k = 0; k < scorer.open().size(); ++k) {
-            const double area = scorer.benefit(*scorer.open()[k], pose.translation).area;
+            const double area = scorer.benefit(*scorer.open()[k], pose).area;
             if (area <= 0) {
                 continue;
             }

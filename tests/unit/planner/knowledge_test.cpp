@@ -118,10 +118,17 @@ TEST_F(Slit, theLeastGainFollowsTheDepthUnlessItIsGiven) {
     EXPECT_NEAR(knowledge.minGain(), 7e-4 * knowledge.summary().area(), 1e-12);
     PlatformLimits exact = limits();
     exact.exactDepth = true;
+    PlatformLimits pixelwise = limits();
+    pixelwise.matched = false;
     PlannerOptions given = options();
     given.minGain = 0.01;
-    for (const auto& [o, share] : {std::pair(options(), 1e-4), std::pair(given, 0.01)}) {
-        Knowledge other(graph, exact, o);
+    PlannerOptions object = options();
+    object.surfaceBox = {1, -1, -1, 2, 1, 1};
+    for (const auto& [l, o, share] :
+         {std::tuple(exact, options(), 1e-4), std::tuple(exact, given, 0.01),
+          std::tuple(exact, object, 3e-4), std::tuple(limits(), object, 3e-4),
+          std::tuple(pixelwise, object, 5e-4)}) {
+        Knowledge other(graph, l, o);
         other.update(test::viewOf(lookAt({0, 0, 0}, {1, 0, 0}), test::wall(1.2)));
         EXPECT_NEAR(other.minGain(), share * other.summary().area(), 1e-12);
     }

@@ -182,16 +182,23 @@ class BenefitOfATear : public testing::Test {
     }
     double area(const Eigen::Vector3d& eye) { return benefit(eye).area; }
     ViewScorer::Benefit benefit(const Eigen::Vector3d& eye) {
+        Pose pose;
+        pose.translation = eye;
+        return benefit(pose);
+    }
+    ViewScorer::Benefit benefit(const Pose& pose) {
         PlatformLimits limits;
         limits.farLimit = 6;
         limits.exactDepth = exact;
+        limits.matched = matched;
         const View view = test::viewOf(lookAt({0, 0, 0}, {1, 0, 0}), test::wall(2.0));
         const ViewScorer scorer(SensorModel::of(view, limits), summary, ledger, space, 0.02,
                                 ViewScorer::Weights());
-        return scorer.benefit(record, eye);
+        return scorer.benefit(record, pose);
     }
     RiftRecord record;
     bool exact = false;
+    bool matched = true;
     SurfaceSummary summary{0.08, 0.02};
 
  private:
@@ -231,6 +238,23 @@ TEST_F(BenefitOfATear, isNothingWhereAFoldIsInTheWay) {
     EXPECT_GT(area(before), 0.004);
 }
 
+TEST_F(BenefitOfATear, needsBothCamerasButWithExactDepth) {
+    PixelGraph graph{GraphOptions()};
+    const View view = test::viewOf(lookAt({0, 0, 0}, {1, 0, 0}), test::wall(2.0));
+    graph.merge(view);
+    summary.update(graph, view);
+    record.cell.openPosition = record.cell.hiddenPosition = {2.05F, 0, 0};
+    record.cell.hiddenNormal = {0, 1, 0};
+    Pose behind;  // the left camera
+    behind.translation = {2.07, 0.5, 0};
+    ASSERT_GT(view.camera.baseline, 0.1);
+    EXPECT_GT(benefit(behind).area, 0.004) << "the right one farther from the wall";
+    behind.rotation = Eigen::AngleAxisd(3.14159265, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+    EXPECT_EQ(benefit(behind).area, 0.0) << "the right one before it";
+    exact = true;
+    EXPECT_GT(benefit(behind).area, 0.004);
+}
+
 TEST_F(BenefitOfATear, leavesCoarseSurfaceItsOwnSide) {
     record.cell.hiddenNormal = {0, 0, 1};
     record.cell.coarse = 0.006F;
@@ -243,12 +267,12 @@ TEST_F(BenefitOfATear, isNextToNothingWithoutAGap) {
     EXPECT_GT(area({-1, 0, 0}), 0.0);
 }
 
-TEST_F(BenefitOfATear, countsAtFlatAnglesWithExactDepthOnly) {
+TEST_F(BenefitOfATear, countsAtFlatAnglesIfDepthIsNotMatched) {
     record.cell.hiddenNormal = {-1, 0, 0};
     const Eigen::Vector3d flat(-0.27, 0.96, 0);
-    const double noisy = area(flat);
-    exact = true;
-    EXPECT_GT(area(flat), 3 * noisy);
+    const double fromMatching = area(flat);
+    matched = false;
+    EXPECT_GT(area(flat), 3 * fromMatching);
 }
 
 }  // namespace

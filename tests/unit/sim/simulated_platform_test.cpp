@@ -162,7 +162,9 @@ TEST(SimulatedPlatform, OnlyExactDepthProvesThatNothingIsThere) {
     for (const auto level :
          {NoiseOptions::Level::kN0, NoiseOptions::Level::kN3, NoiseOptions::Level::kN4}) {
         options.noise.level = level;
-        EXPECT_EQ(makePlatform(options, 1)->limits().exactDepth, level == NoiseOptions::Level::kN0);
+        const PlatformLimits limits = makePlatform(options, 1)->limits();
+        EXPECT_EQ(limits.exactDepth, level == NoiseOptions::Level::kN0);
+        EXPECT_EQ(limits.matched, level == NoiseOptions::Level::kN4);
     }
 }
 

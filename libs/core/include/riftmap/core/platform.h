@@ -31,6 +31,9 @@ struct PlatformLimits {
     /// Every pixel that meets a surface within the range is measured: one without a match shows
     /// that there is none (exact depth). A matcher cannot say so.
     bool exactDepth = false;
+    /// Depth comes from windows that are matched, which flat angles and surface nearer than the
+    /// range mislead; otherwise from each pixel by itself.
+    bool matched = true;
 };
 
 /// A path that touches a surface or leaves the workspace.

@@ -17,6 +17,7 @@ struct SensorModel {
     double sigmaDisparity = 0;  ///< median of the valid pixels [px]
     double clearance = 0;       ///< around the camera there is nothing nearer than this [m]
     bool exactDepth = false;    ///< PlatformLimits::exactDepth
+    bool matched = true;        ///< PlatformLimits::matched
 
     /// As the last view was, within the platform's range.
     static SensorModel of(const View& view, const PlatformLimits& limits);

@@ -60,14 +60,14 @@ class ViewScorer {
     bool samples() const { return open_.size() > kMostOpen; }
     /// Unknown places that the view would look into.
     std::vector<Eigen::Vector3d> unknownSeen(const Pose& world_T_camera) const;
-    /// Area that seeing this open cell from there would bring, without occlusion [m^2], and the
-    /// quality of that view of it, 0 (in vain) to 1.
+    /// Area that seeing this open cell from there would bring, hidden by nothing but what stands
+    /// close before it [m^2], and the quality of that view of it, 0 (in vain) to 1.
     struct Benefit {
         double area = 0, quality = 0;
         double torn = 0, coarse = 0;  ///< shares of what the tear and its coarse part are worth
         double coarseArea = 0;        ///< part of the area: surface known better [m^2]
     };
-    Benefit benefit(const RiftRecord& record, const Eigen::Vector3d& eye) const;
+    Benefit benefit(const RiftRecord& record, const Pose& world_T_camera) const;
     /// Share of a tear's worth that is left after the views of it that did not help.
     double leftAfterTries(const RiftRecord& record) const;
 
@@ -121,6 +121,7 @@ class ViewScorer {
     double besideRim(const SurfaceCell& cell) const;
     double nearShareOf(const DepthBuffer& buffer) const;
     bool visible(const DepthBuffer& buffer, const Eigen::Vector3f& inCamera, float slack) const;
+    bool openTo(const SurfaceCell& cell, const Pose& world_T_camera) const;
     template <class F>
     void forEachUnknown(const Pose& world_T_camera, const DepthBuffer& buffer, int stride,
                         const F& f) const;
