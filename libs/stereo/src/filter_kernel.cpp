@@ -160,6 +160,59 @@ std::int32_t roughness(const std::uint8_t* first, std::size_t stride) {
     return total;
 }
 
+void planeMiddles(const float* const* rows, int count, int first, std::size_t width, float most,
+                  float* out) {
+    along(0, width, [&](auto tag, std::size_t i) {
+        const auto set = [&](int x) { return hn::Set(tag, static_cast<float>(x)); };
+        const auto zero = hn::Zero(tag);
+        const auto here = hn::LoadU(tag, rows[-first] + i + kPlaneReach);
+        // Sums over the points (u, v) that lie r beyond the pixel's own disparity.
+        auto n = zero, su = zero, sv = zero, suu = zero, suv = zero, svv = zero;
+        auto sr = zero, sur = zero, svr = zero;
+        for (int k = 0; k < count; ++k) {
+            auto rowN = zero, rowU = zero, rowUU = zero, rowR = zero, rowUR = zero;
+            for (int u = -kPlaneReach; u <= kPlaneReach; ++u) {
+                const auto there =
+                    hn::LoadU(tag, rows[k] + i + static_cast<std::size_t>(u + kPlaneReach));
+                const auto beyond = hn::Sub(there, here);
+                // Not a number, from two infinities, compares false.
+                const auto counts = hn::Le(hn::Abs(beyond), hn::Set(tag, most));
+                const auto one = hn::IfThenElseZero(counts, set(1));
+                const auto r = hn::IfThenElseZero(counts, beyond);
+                rowN = hn::Add(rowN, one);
+                rowU = hn::Add(rowU, hn::Mul(set(u), one));
+                rowUU = hn::Add(rowUU, hn::Mul(set(u * u), one));
+                rowR = hn::Add(rowR, r);
+                rowUR = hn::Add(rowUR, hn::Mul(set(u), r));
+            }
+            const int v = first + k;
+            n = hn::Add(n, rowN);
+            su = hn::Add(su, rowU);
+            sv = hn::Add(sv, hn::Mul(set(v), rowN));
+            suu = hn::Add(suu, rowUU);
+            suv = hn::Add(suv, hn::Mul(set(v), rowU));
+            svv = hn::Add(svv, hn::Mul(set(v * v), rowN));
+            sr = hn::Add(sr, rowR);
+            sur = hn::Add(sur, rowUR);
+            svr = hn::Add(svr, hn::Mul(set(v), rowR));
+        }
+        // Cramer's rule. The determinant is of whole numbers: 0, or 1 and more but for rounding.
+        const auto minus = [&](auto a, auto b, auto c, auto d) {
+            return hn::Sub(hn::Mul(a, b), hn::Mul(c, d));
+        };
+        const auto a = minus(suu, svv, suv, suv);
+        const auto b = minus(sv, suv, su, svv);
+        const auto c = minus(su, suv, sv, suu);
+        const auto times = [&](auto x, auto y, auto z) {
+            return hn::Add(hn::Add(hn::Mul(x, a), hn::Mul(y, b)), hn::Mul(z, c));
+        };
+        const auto determinant = times(n, su, sv);
+        const auto plane = hn::And(hn::Ge(n, set(6)), hn::Gt(determinant, hn::Set(tag, 0.5F)));
+        const auto middle = hn::Div(times(sr, sur, svr), determinant);
+        hn::StoreU(hn::Add(here, hn::IfThenElseZero(plane, middle)), tag, out + i);
+    });
+}
+
 }  // namespace HWY_NAMESPACE
 }  // namespace riftmap::kernel
 HWY_AFTER_NAMESPACE();
@@ -172,6 +225,7 @@ HWY_EXPORT(leastAlong);
 HWY_EXPORT(discardAbove);
 HWY_EXPORT(growSigma);
 HWY_EXPORT(roughness);
+HWY_EXPORT(planeMiddles);
 
 std::size_t findEnds(const float* d, std::size_t width, float maxDifference, std::int32_t* ends) {
     return HWY_DYNAMIC_DISPATCH(findEnds)(d, width, maxDifference, ends);
@@ -189,6 +243,11 @@ void discardAbove(const float* const* rows, std::size_t count, std::size_t width
 void growSigma(const float* d, const float* up, const float* down, std::size_t width, float slope,
                float* sigma) {
     HWY_DYNAMIC_DISPATCH(growSigma)(d, up, down, width, slope, sigma);
+}
+
+void planeMiddles(const float* const* rows, int count, int first, std::size_t width, float most,
+                  float* out) {
+    HWY_DYNAMIC_DISPATCH(planeMiddles)(rows, count, first, width, most, out);
 }
 
 std::int32_t roughness(const std::uint8_t* first, std::size_t stride) {

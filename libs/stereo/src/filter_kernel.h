@@ -29,6 +29,17 @@ inline constexpr std::size_t kSlopeReach = 3;
 void growSigma(const float* d, const float* up, const float* down, std::size_t width, float slope,
                float* sigma);
 
+/// Rows and columns around a pixel that planeMiddles() looks at [px].
+inline constexpr int kPlaneReach = 3;
+
+/// The plane, by least squares, through the disparities around pixel i of a row that differ from
+/// its own by `most` at most: out[i] is its value in the middle, or the pixel's own disparity where
+/// fewer than six points or no plane are found. rows[k], k in [0, count), is the row first + k rows
+/// on from that of the pixels (-kPlaneReach <= first <= 0), from kPlaneReach columns before its
+/// first one to as many beyond its last one.
+void planeMiddles(const float* const* rows, int count, int first, std::size_t width, float most,
+                  float* out);
+
 /// Side of the blocks of roughness() [px].
 inline constexpr int kNoiseBlock = 8;
 

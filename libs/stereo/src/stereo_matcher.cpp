@@ -2,6 +2,8 @@
 #include "riftmap/stereo/stereo_matcher.h"
 
 #include "riftmap/stereo/disparity_filters.h"
+#include "riftmap/stereo/disparity_refiner.h"
+#include "riftmap/stereo/grey.h"
 #include "riftmap/stereo/opencv_matchers.h"
 #include "riftmap/stereo/paper_matcher.h"
 
@@ -75,6 +77,9 @@ void StereoOptions::describe(OptionTable& table) {
               "The same up and down: there the left/right check does not help.");
     table.add("silhouette_step", silhouetteStep, 0.5, 64.0, "px",
               "Disparity by which a farther surface is lower, at least.");
+    table.add("refine", refine, 0, 10, "",
+              "Iterations of least squares between the images after matching, along the surface's "
+              "slope (DisparityRefiner): half the error, two are enough; 0: none.");
     table.add("sigma_floor", sigmaFloor, 0.001, 10.0, "px",
               "Least standard deviation of a matched disparity.");
     table.add("sigma_noise", sigmaNoise, 0.0, 100.0, "",
@@ -99,11 +104,9 @@ void StereoOptions::describe(OptionTable& table) {
               "surface of the map; 0: no limit.");
 }
 
-std::unique_ptr<StereoMatcher> makeStereoMatcher(const StereoOptions& options) {
-    if (options.window % 2 == 0) {
-        throw ConfigError("[Stereo] window = " + std::to_string(options.window) +
-                          ": allowed: odd, 3 .. 21");
-    }
+namespace {
+
+std::unique_ptr<StereoMatcher> makePlainMatcher(const StereoOptions& options) {
     switch (options.matcher) {
         case MatcherKind::kPaper:
             return std::make_unique<PaperMatcher>(options);
@@ -115,6 +118,37 @@ std::unique_ptr<StereoMatcher> makeStereoMatcher(const StereoOptions& options) {
             break;
     }
     return nullptr;
+}
+
+class RefinedMatcher : public StereoMatcher {
+ public:
+    RefinedMatcher(std::unique_ptr<StereoMatcher> matcher, int iterations)
+        : matcher_(std::move(matcher)), iterations_(iterations) {}
+    void compute(const cv::Mat& left, const cv::Mat& right, DisparityImage& out) override {
+        matcher_->compute(left, right, out);
+        toGreyPair(left, right, grey_);
+        refiner_.apply(grey_.left, grey_.right, iterations_, out);
+    }
+
+ private:
+    std::unique_ptr<StereoMatcher> matcher_;
+    int iterations_;
+    GreyPair grey_;
+    DisparityRefiner refiner_;
+};
+
+}  // namespace
+
+std::unique_ptr<StereoMatcher> makeStereoMatcher(const StereoOptions& options) {
+    if (options.window % 2 == 0) {
+        throw ConfigError("[Stereo] window = " + std::to_string(options.window) +
+                          ": allowed: odd, 3 .. 21");
+    }
+    auto matcher = makePlainMatcher(options);
+    if (matcher && options.refine > 0) {
+        return std::make_unique<RefinedMatcher>(std::move(matcher), options.refine);
+    }
+    return matcher;
 }
 
 }  // namespace riftmap

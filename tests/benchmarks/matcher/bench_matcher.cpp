@@ -27,6 +27,7 @@
 
 #include "middlebury.h"
 #include "riftmap/core/csv.h"
+#include "riftmap/stereo/facet_filter.h"
 #include "riftmap/stereo/opencv_matchers.h"
 #include "riftmap/stereo/paper_matcher.h"
 
@@ -68,7 +69,7 @@ std::vector<Contender> contenders(const std::vector<std::string>& settings) {
             for (const std::string& setting : settings) {
                 table.set(setting);
             }
-            return std::make_unique<PaperMatcher>(o);
+            return makeStereoMatcher(o);
         };
     };
     const auto openCv = [](int n, int uniqueness) {
@@ -89,6 +90,7 @@ std::vector<Contender> contenders(const std::vector<std::string>& settings) {
         };
     };
     return {{"paper", paper([](StereoOptions&) {})},
+            {"paper_refined", paper([](StereoOptions& o) { o.refine = 2; })},
             {"paper_semi_global", paper(setSemiGlobal)},
             {"paper_dense", paper([](StereoOptions& o) {
                  setSemiGlobal(o);
@@ -195,6 +197,17 @@ void timeAll(const std::string& folder, int rounds, Figures& figures) {
     StereoOptions semiGlobalOptions;
     setSemiGlobal(semiGlobalOptions);
     PaperMatcher semiGlobal(semiGlobalOptions);
+    StereoOptions refinedOptions;
+    refinedOptions.refine = 2;
+    const auto refined = makeStereoMatcher(refinedOptions);
+    DisparityImage given;  // with noise of its own at each pixel
+    paper.compute(left, right, given);
+    cv::RNG random(1);
+    for (std::size_t i = 0; i < given.disparity.size(); ++i) {
+        given.disparity[i] += static_cast<float>(random.gaussian(0.25));
+        given.sigma[i] = 0.25F;
+    }
+    FacetFilter facets;
     const auto bm = cv::StereoBM::create(options.numDisparities, options.window);
     bm->setDisp12MaxDiff(1);
     const auto sgbm = cv::StereoSGBM::create(0, options.numDisparities, 5, 200, 800, 1, 63, 10, 0,
@@ -202,15 +215,24 @@ void timeAll(const std::string& folder, int rounds, Figures& figures) {
     DisparityImage disparity;
     cv::Mat raw;
     tbb::task_arena one(1), two(2);
-    const auto in = [&](tbb::task_arena& arena, PaperMatcher& matcher) {
+    const auto in = [&](tbb::task_arena& arena, StereoMatcher& matcher) {
         return [&] { arena.execute([&] { matcher.compute(left, right, disparity); }); };
     };
-    enum { kBm, kPaper, kPaper2, kSemiGlobal, kSgbm, kCompute, kCompute2 };
-    std::array<Turn, 7> turns;
+    enum { kBm, kPaper, kPaper2, kSemiGlobal, kRefined, kFacets, kSgbm, kCompute, kCompute2 };
+    std::array<Turn, 9> turns;
     turns[kBm] = {"cv::StereoBM, 1 thread", [&] { bm->compute(left, right, raw); }, {}};
     turns[kPaper] = {"paper, 1 thread", in(one, paper), {}};
     turns[kPaper2] = {"paper, 2 threads", in(two, paper), {}};
     turns[kSemiGlobal] = {"paper semi-global, 1 thread", in(one, semiGlobal), {}};
+    turns[kRefined] = {"paper refined, 1 thread", in(one, *refined), {}};
+    turns[kFacets] = {"facet filter, 1 thread",
+                      [&] {
+                          one.execute([&] {
+                              disparity = given;
+                              facets.apply(disparity, options.facetRadius);
+                          });
+                      },
+                      {}};
     turns[kSgbm] = {"cv::StereoSGBM 3-way, 1 thread", [&] { sgbm->compute(left, right, raw); }, {}};
     turns[kCompute] = {"compute only, 1 thread", [&] { one.execute(computeOnly); }, {}};
     turns[kCompute2] = {"compute only, 2 threads", [&] { two.execute(computeOnly); }, {}};
@@ -244,6 +266,9 @@ void timeAll(const std::string& folder, int rounds, Figures& figures) {
     ratio("machine_speedup_2threads", kCompute, kCompute2);
     ratio("semi_global_time_ratio_bm_1thread", kSemiGlobal, kBm);
     ratio("semi_global_time_ratio_sgbm_1thread", kSemiGlobal, kSgbm);
+    ratio("refined_time_ratio_bm_1thread", kRefined, kBm);
+    ratio("refined_time_ratio_sgbm_1thread", kRefined, kSgbm);
+    ratio("facets_time_ratio_bm_1thread", kFacets, kBm);
     figures.add("paper_1thread", median(turns[kPaper].ms), "ms");
     figures.add("paper_2threads", median(turns[kPaper2].ms), "ms");
     figures.add("opencv_bm_1thread", median(turns[kBm].ms), "ms");

@@ -89,7 +89,7 @@ cv::Mat notInterior(const cv::Mat& disparity) {
 
 /// One view of a built-in world: adds the pixels inside of surfaces that are seen at less than 65
 /// degrees from their normal.
-void addView(WorldOptions::Name name, double sensorNoise, Deviation& interior) {
+void addView(WorldOptions::Name name, double sensorNoise, int refine, Deviation& interior) {
     constexpr double kCosine = 0.4226;
     WorldOptions worldOptions;
     worldOptions.name = name;
@@ -113,8 +113,9 @@ void addView(WorldOptions::Name name, double sensorNoise, Deviation& interior) {
     const cv::Mat outside = notInterior(disparity);
     StereoOptions options;
     options.numDisparities = rig.numDisparities;
+    options.refine = refine;
     DisparityImage found;
-    PaperMatcher(options).compute(pair.left, pair.right, found);
+    makeStereoMatcher(options)->compute(pair.left, pair.right, found);
     for (int r = 0; r < found.height; ++r) {
         for (int c = found.firstColumn; c < found.width; ++c) {
             const auto& n = truth.normals.at<cv::Vec3f>(r, c);
@@ -170,12 +171,14 @@ TEST(SigmaOfNoisyDepth, IsThatOfTheErrorAfterSmoothing) {
     }
 }
 
-TEST(SigmaOfRenderedPairs, IsThatOfTheErrorInsideOfSurfaces) {
+class SigmaOfRenderedPairs : public ::testing::TestWithParam<int> {};
+
+TEST_P(SigmaOfRenderedPairs, IsThatOfTheErrorInsideOfSurfaces) {
     for (const double noise : {0.0, 1.5, 4.0}) {
         Deviation all;
         for (const auto world : {WorldOptions::Name::kRoom, WorldOptions::Name::kRooms,
                                  WorldOptions::Name::kSculpture, WorldOptions::Name::kCourtyard}) {
-            addView(world, noise, all);
+            addView(world, noise, GetParam(), all);
         }
         std::cout << "rendered, sensor noise " << noise << ": " << all.value() << "\n";
         EXPECT_GT(all.n, 10000);
@@ -183,6 +186,8 @@ TEST(SigmaOfRenderedPairs, IsThatOfTheErrorInsideOfSurfaces) {
         EXPECT_LE(all.value(), kMost) << noise;
     }
 }
+
+INSTANTIATE_TEST_SUITE_P(Refined, SigmaOfRenderedPairs, ::testing::Values(0, 2));
 
 }  // namespace
 }  // namespace riftmap

@@ -52,6 +52,8 @@ struct StereoOptions {
     int silhouetteRows = 4;         ///< the same up and down [rows]
     double silhouetteStep = 4;      ///< what counts as farther: lower disparity by more [px]
 
+    int refine = 0;  ///< iterations of DisparityRefiner after the matcher; 0: none
+
     double sigmaFloor = 0.08;     ///< least standard deviation of a disparity [px]
     double sigmaNoise = 3.5;      ///< its growth with the images' noise over the curvature
     double sigmaMismatch = 0.43;  ///< its growth with what else is left of the cost

@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "riftmap/stereo/disparity_refiner.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <stdexcept>
+
+#include "filter_kernel.h"
+#include "riftmap/core/parallel.h"
+
+namespace riftmap {
+
+namespace {
+
+constexpr int kReach = 3;              // of the plane and of the window [px]
+constexpr float kOneSurface = 1.5F;    // [px]
+constexpr float kMostMove = 0.5F;      // [px]
+constexpr float kRounding = 1.0F / 6;  // variance of the difference of two rounded samples
+constexpr std::size_t kRows = 8;       // of one task
+
+/// Catmull and Rom's spline through four samples, t of the way from the second to the third.
+float between(const std::array<float, 4>& p, float t) {
+    return p[1] + 0.5F * t *
+                      (p[2] - p[0] +
+                       t * (2 * p[0] - 5 * p[1] + 4 * p[2] - p[3] +
+                            t * (3 * (p[1] - p[2]) + p[3] - p[0])));
+}
+
+/// Sums over a window, for the pixels of a row.
+struct WindowSums {
+    explicit WindowSums(int width) {
+        for (auto& sums : {&one, &g, &e, &gg, &ge, &ee}) {
+            sums->resize(static_cast<std::size_t>(width));
+        }
+    }
+    std::vector<float> one, g, e, gg, ge, ee;
+};
+
+float around(const std::vector<float>& sums, int column) {
+    const int last = std::min(static_cast<int>(sums.size()) - 1, column + kReach);
+    float sum = 0;
+    for (int c = std::max(0, column - kReach); c <= last; ++c) {
+        sum += sums[static_cast<std::size_t>(c)];
+    }
+    return sum;
+}
+
+}  // namespace
+
+void DisparityRefiner::smooth(DisparityImage& image) {
+    const auto width = static_cast<std::size_t>(image.width);
+    const std::size_t stride = width + 2 * kReach;
+    padded_.assign(stride * static_cast<std::size_t>(image.height), kNoDisparity);
+    const auto paddedRow = [&](int row) {
+        return padded_.data() + static_cast<std::size_t>(row) * stride;
+    };
+    parallelForEach(image.height, kRows, [&](int row) {
+        std::copy_n(image.disparity.data() + image.index(0, row), width, paddedRow(row) + kReach);
+    });
+    parallelForEach(image.height, kRows, [&](int row) {
+        std::array<const float*, 2 * kReach + 1> rows{};
+        const int first = std::max(-kReach, -row);
+        const int count = std::min(kReach, image.height - 1 - row) - first + 1;
+        for (int k = 0; k < count; ++k) {
+            rows[static_cast<std::size_t>(k)] = paddedRow(row + first + k);
+        }
+        float* const out = image.disparity.data() + image.index(0, row);
+        kernel::planeMiddles(rows.data(), count, first, width, kOneSurface, out);
+        for (std::size_t c = 0; c < width; ++c) {
+            out[c] = out[c] < kNoDisparity
+                         ? std::clamp(out[c], image.minDisparity, image.maxDisparity)
+                         : kNoDisparity;
+        }
+    });
+}
+
+void DisparityRefiner::warp(const cv::Mat& left, const cv::Mat& right,
+                            const DisparityImage& image) {
+    for (auto* plane : {&compared_, &gradient_, &difference_}) {
+        plane->assign(image.disparity.size(), 0.0F);
+    }
+    parallelForEach(image.height, kRows, [&](int row) {
+        const unsigned char* l = left.ptr<unsigned char>(row);
+        const unsigned char* r = right.ptr<unsigned char>(row);
+        for (int column = 1; column < image.width - 1; ++column) {
+            const std::size_t i = image.index(column, row);
+            const float x = static_cast<float>(column) - image.disparity[i];
+            if (!(x >= 2.0F && x < static_cast<float>(image.width - 3))) {
+                continue;  // no partner, or no match
+            }
+            const auto first = static_cast<int>(x);
+            const float t = x - static_cast<float>(first);
+            const auto sample = [&](int from) {
+                return between({static_cast<float>(r[from - 1]), static_cast<float>(r[from]),
+                                static_cast<float>(r[from + 1]), static_cast<float>(r[from + 2])},
+                               t);
+            };
+            const float ofRight = sample(first + 1) - sample(first - 1);
+            const auto ofLeft = static_cast<float>(l[column + 1] - l[column - 1]);
+            compared_[i] = 1;
+            gradient_[i] = 0.25F * (ofLeft + ofRight);
+            difference_[i] = static_cast<float>(l[column]) - sample(first);
+        }
+    });
+}
+
+void DisparityRefiner::move(DisparityImage& image) {
+    parallelFor(
+        static_cast<std::size_t>(image.height), kRows, [&](std::size_t begin, std::size_t end) {
+            for (auto row = static_cast<int>(begin); row < static_cast<int>(end); ++row) {
+                WindowSums s(image.width);
+                const int last = std::min(image.height - 1, row + kReach);
+                for (int r = std::max(0, row - kReach); r <= last; ++r) {
+                    const std::size_t start = image.index(0, r);
+                    for (std::size_t c = 0; c < s.one.size(); ++c) {
+                        const float g = gradient_[start + c];
+                        const float e = difference_[start + c];
+                        s.one[c] += compared_[start + c];
+                        s.g[c] += g;
+                        s.e[c] += e;
+                        s.gg[c] += g * g;
+                        s.ge[c] += g * e;
+                        s.ee[c] += e * e;
+                    }
+                }
+                for (int column = 0; column < image.width; ++column) {
+                    const std::size_t i = image.index(column, row);
+                    const float n = around(s.one, column);
+                    constexpr float kLeast = 10;  // pixels
+                    if (compared_[i] == 0 || n < kLeast) {
+                        continue;
+                    }
+                    const float g = around(s.g, column);
+                    const float e = around(s.e, column);
+                    const float gg = std::max(around(s.gg, column) - g * g / n, 1e-3F);
+                    const float ge = around(s.ge, column) - g * e / n;
+                    const float ee = around(s.ee, column) - e * e / n;
+                    const float rest = std::max((ee - ge * ge / gg) / (n - 2), kRounding);
+                    const float prior = matched_[i] * matched_[i];
+                    const float by = std::clamp(-ge / (gg + rest / prior), -kMostMove, kMostMove);
+                    image.disparity[i] =
+                        std::clamp(image.disparity[i] + by, image.minDisparity, image.maxDisparity);
+                    image.sigma[i] = std::sqrt(1.0F / (1 / prior + gg / rest) + 0.2F * prior);
+                }
+            }
+        });
+}
+
+void DisparityRefiner::apply(const cv::Mat& left, const cv::Mat& right, int iterations,
+                             DisparityImage& image) {
+    for (const cv::Mat* m : {&left, &right}) {
+        if (m->type() != CV_8UC1 || m->cols != image.width || m->rows != image.height) {
+            throw std::invalid_argument("refining takes 8-bit grey images of the disparity's size");
+        }
+    }
+    if (iterations <= 0) {
+        return;
+    }
+    matched_ = image.sigma;
+    for (int i = 0; i < iterations; ++i) {
+        smooth(image);
+        warp(left, right, image);
+        move(image);
+    }
+    smooth(image);
+}
+
+}  // namespace riftmap
