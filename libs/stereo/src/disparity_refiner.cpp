@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <stdexcept>
 
 #include "filter_kernel.h"
@@ -13,11 +12,9 @@ namespace riftmap {
 
 namespace {
 
-constexpr int kReach = 3;              // of the plane and of the window [px]
-constexpr float kOneSurface = 1.5F;    // [px]
-constexpr float kMostMove = 0.5F;      // [px]
-constexpr float kRounding = 1.0F / 6;  // variance of the difference of two rounded samples
-constexpr std::size_t kRows = 8;       // of one task
+constexpr int kReach = kernel::kPlaneReach;  // of the window, too [px]
+constexpr float kOneSurface = 1.5F;          // [px]
+constexpr std::size_t kRows = 8;             // of one task
 
 /// Catmull and Rom's spline through four samples, t of the way from the second to the third.
 float between(const std::array<float, 4>& p, float t) {
@@ -25,25 +22,6 @@ float between(const std::array<float, 4>& p, float t) {
                       (p[2] - p[0] +
                        t * (2 * p[0] - 5 * p[1] + 4 * p[2] - p[3] +
                             t * (3 * (p[1] - p[2]) + p[3] - p[0])));
-}
-
-/// Sums over a window, for the pixels of a row.
-struct WindowSums {
-    explicit WindowSums(int width) {
-        for (auto& sums : {&one, &g, &e, &gg, &ge, &ee}) {
-            sums->resize(static_cast<std::size_t>(width));
-        }
-    }
-    std::vector<float> one, g, e, gg, ge, ee;
-};
-
-float around(const std::vector<float>& sums, int column) {
-    const int last = std::min(static_cast<int>(sums.size()) - 1, column + kReach);
-    float sum = 0;
-    for (int c = std::max(0, column - kReach); c <= last; ++c) {
-        sum += sums[static_cast<std::size_t>(c)];
-    }
-    return sum;
 }
 
 }  // namespace
@@ -106,45 +84,26 @@ void DisparityRefiner::warp(const cv::Mat& left, const cv::Mat& right,
 }
 
 void DisparityRefiner::move(DisparityImage& image) {
-    parallelFor(
-        static_cast<std::size_t>(image.height), kRows, [&](std::size_t begin, std::size_t end) {
-            for (auto row = static_cast<int>(begin); row < static_cast<int>(end); ++row) {
-                WindowSums s(image.width);
-                const int last = std::min(image.height - 1, row + kReach);
-                for (int r = std::max(0, row - kReach); r <= last; ++r) {
-                    const std::size_t start = image.index(0, r);
-                    for (std::size_t c = 0; c < s.one.size(); ++c) {
-                        const float g = gradient_[start + c];
-                        const float e = difference_[start + c];
-                        s.one[c] += compared_[start + c];
-                        s.g[c] += g;
-                        s.e[c] += e;
-                        s.gg[c] += g * g;
-                        s.ge[c] += g * e;
-                        s.ee[c] += e * e;
+    const auto width = static_cast<std::size_t>(image.width);
+    parallelFor(static_cast<std::size_t>(image.height), kRows,
+                [&](std::size_t begin, std::size_t end) {
+                    std::vector<float> scratch(6 * (width + 2 * kReach), 0.0F);
+                    for (auto row = static_cast<int>(begin); row < static_cast<int>(end); ++row) {
+                        std::array<kernel::ComparedRow, 2 * kReach + 1> rows{};
+                        const int first = std::max(-kReach, -row);
+                        const int count = std::min(kReach, image.height - 1 - row) - first + 1;
+                        for (int k = 0; k < count; ++k) {
+                            const std::size_t start = image.index(0, row + first + k);
+                            rows.at(static_cast<std::size_t>(k)) = {compared_.data() + start,
+                                                                    gradient_.data() + start,
+                                                                    difference_.data() + start};
+                        }
+                        const std::size_t start = image.index(0, row);
+                        kernel::moveRow(rows.data(), count, -first, width, matched_.data() + start,
+                                        image.minDisparity, image.maxDisparity, scratch.data(),
+                                        image.disparity.data() + start, image.sigma.data() + start);
                     }
-                }
-                for (int column = 0; column < image.width; ++column) {
-                    const std::size_t i = image.index(column, row);
-                    const float n = around(s.one, column);
-                    constexpr float kLeast = 10;  // pixels
-                    if (compared_[i] == 0 || n < kLeast) {
-                        continue;
-                    }
-                    const float g = around(s.g, column);
-                    const float e = around(s.e, column);
-                    const float gg = std::max(around(s.gg, column) - g * g / n, 1e-3F);
-                    const float ge = around(s.ge, column) - g * e / n;
-                    const float ee = around(s.ee, column) - e * e / n;
-                    const float rest = std::max((ee - ge * ge / gg) / (n - 2), kRounding);
-                    const float prior = matched_[i] * matched_[i];
-                    const float by = std::clamp(-ge / (gg + rest / prior), -kMostMove, kMostMove);
-                    image.disparity[i] =
-                        std::clamp(image.disparity[i] + by, image.minDisparity, image.maxDisparity);
-                    image.sigma[i] = std::sqrt(1.0F / (1 / prior + gg / rest) + 0.2F * prior);
-                }
-            }
-        });
+                });
 }
 
 void DisparityRefiner::apply(const cv::Mat& left, const cv::Mat& right, int iterations,

@@ -213,6 +213,67 @@ void planeMiddles(const float* const* rows, int count, int first, std::size_t wi
     });
 }
 
+void moveRow(const ComparedRow* rows, int count, int own, std::size_t width, const float* matched,
+             float least, float most, float* scratch, float* d, float* sigma) {
+    constexpr float kMostMove = 0.5F;      // [px]
+    constexpr float kRounding = 1.0F / 6;  // variance of the difference of two rounded samples
+    constexpr float kLeastPixels = 10;
+    const std::size_t stride = width + 2 * kPlaneReach;
+    along(0, width, [&](auto tag, std::size_t i) {
+        auto n = hn::Zero(tag);
+        auto g = n, e = n, gg = n, ge = n, ee = n;
+        for (int k = 0; k < count; ++k) {
+            const auto gradient = hn::LoadU(tag, rows[k].gradient + i);
+            const auto difference = hn::LoadU(tag, rows[k].difference + i);
+            n = hn::Add(n, hn::LoadU(tag, rows[k].compared + i));
+            g = hn::Add(g, gradient);
+            e = hn::Add(e, difference);
+            gg = hn::Add(gg, hn::Mul(gradient, gradient));
+            ge = hn::Add(ge, hn::Mul(gradient, difference));
+            ee = hn::Add(ee, hn::Mul(difference, difference));
+        }
+        float* const to = scratch + i + kPlaneReach;
+        hn::StoreU(n, tag, to);
+        hn::StoreU(g, tag, to + stride);
+        hn::StoreU(e, tag, to + 2 * stride);
+        hn::StoreU(gg, tag, to + 3 * stride);
+        hn::StoreU(ge, tag, to + 4 * stride);
+        hn::StoreU(ee, tag, to + 5 * stride);
+    });
+    along(0, width, [&](auto tag, std::size_t i) {
+        const auto set = [&](float x) { return hn::Set(tag, x); };
+        const auto window = [&](std::size_t k) {
+            auto sum = hn::Zero(tag);
+            for (std::size_t u = 0; u <= 2 * kPlaneReach; ++u) {
+                sum = hn::Add(sum, hn::LoadU(tag, scratch + k * stride + i + u));
+            }
+            return sum;
+        };
+        const auto n = window(0), g = window(1), e = window(2);
+        const auto compared = hn::LoadU(tag, rows[own].compared + i);
+        const auto moves = hn::And(hn::Gt(compared, set(0)), hn::Ge(n, set(kLeastPixels)));
+        // Without the means; var(g) at least so much that it divides.
+        const auto without = [&](auto sum, auto a, auto b) {
+            return hn::Sub(sum, hn::Div(hn::Mul(a, b), n));
+        };
+        const auto gg = hn::Max(without(window(3), g, g), set(1e-3F));
+        const auto ge = without(window(4), g, e);
+        const auto ee = without(window(5), e, e);
+        const auto rest = hn::Max(
+            hn::Div(hn::Sub(ee, hn::Div(hn::Mul(ge, ge), gg)), hn::Sub(n, set(2))), set(kRounding));
+        const auto ofMatcher = hn::LoadU(tag, matched + i);
+        const auto prior = hn::Mul(ofMatcher, ofMatcher);
+        const auto by = hn::Clamp(hn::Div(hn::Neg(ge), hn::Add(gg, hn::Div(rest, prior))),
+                                  set(-kMostMove), set(kMostMove));
+        const auto here = hn::LoadU(tag, d + i);
+        const auto there = hn::Clamp(hn::Add(here, by), set(least), set(most));
+        hn::StoreU(hn::IfThenElse(moves, there, here), tag, d + i);
+        const auto inverse = hn::Add(hn::Div(set(1), prior), hn::Div(gg, rest));
+        const auto left = hn::Sqrt(hn::Add(hn::Div(set(1), inverse), hn::Mul(set(0.2F), prior)));
+        hn::StoreU(hn::IfThenElse(moves, left, hn::LoadU(tag, sigma + i)), tag, sigma + i);
+    });
+}
+
 }  // namespace HWY_NAMESPACE
 }  // namespace riftmap::kernel
 HWY_AFTER_NAMESPACE();
@@ -226,6 +287,7 @@ HWY_EXPORT(discardAbove);
 HWY_EXPORT(growSigma);
 HWY_EXPORT(roughness);
 HWY_EXPORT(planeMiddles);
+HWY_EXPORT(moveRow);
 
 std::size_t findEnds(const float* d, std::size_t width, float maxDifference, std::int32_t* ends) {
     return HWY_DYNAMIC_DISPATCH(findEnds)(d, width, maxDifference, ends);
@@ -248,6 +310,12 @@ void growSigma(const float* d, const float* up, const float* down, std::size_t w
 void planeMiddles(const float* const* rows, int count, int first, std::size_t width, float most,
                   float* out) {
     HWY_DYNAMIC_DISPATCH(planeMiddles)(rows, count, first, width, most, out);
+}
+
+void moveRow(const ComparedRow* rows, int count, int own, std::size_t width, const float* matched,
+             float least, float most, float* scratch, float* d, float* sigma) {
+    HWY_DYNAMIC_DISPATCH(moveRow)
+    (rows, count, own, width, matched, least, most, scratch, d, sigma);
 }
 
 std::int32_t roughness(const std::uint8_t* first, std::size_t stride) {

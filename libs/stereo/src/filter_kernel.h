@@ -40,6 +40,21 @@ inline constexpr int kPlaneReach = 3;
 void planeMiddles(const float* const* rows, int count, int first, std::size_t width, float most,
                   float* out);
 
+/// For moveRow(): a row of every plane that DisparityRefiner compares the images in, 0 where a
+/// pixel has no partner.
+struct ComparedRow {
+    const float* compared;    ///< 1: it has one
+    const float* gradient;    ///< [grey levels a pixel]
+    const float* difference;  ///< [grey levels]
+};
+
+/// Step 3 of DisparityRefiner for the pixels of a row. rows[k], k in [0, count): those within
+/// kPlaneReach rows, `own` is the row's own index among them. `matched`: sigma of the matcher.
+/// `scratch` has room for 6 (width + 2 kPlaneReach) numbers and holds zeros where the window
+/// reaches beyond the row, before the first call and after each.
+void moveRow(const ComparedRow* rows, int count, int own, std::size_t width, const float* matched,
+             float least, float most, float* scratch, float* d, float* sigma);
+
 /// Side of the blocks of roughness() [px].
 inline constexpr int kNoiseBlock = 8;
 
