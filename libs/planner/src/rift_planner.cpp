@@ -309,11 +309,19 @@ void Choice::forEachInSight(const RiftRecord& record, bool anywhere, const F& f)
     // What it hides may face any way.
     const bool step = (record.cell.kinds & kDepthStep) != 0 || record.cell.hidden > 0;
     const Eigen::Vector3d normal = record.cell.openNormal.cast<double>();
-    for (int k = 0; k < kDirections; ++k) {
-        const int i = k * 247 % kDirections;  // so that the first ones are from all sides, too
-        const Eigen::Vector3d out = evenDirection(i, kDirections);
-        if (step || normal.isZero() || out.dot(normal) > kFacing) {
-            const auto eye = lookOut(record, out, anywhere);
+    constexpr int kAtOnce = 40;
+    static_assert(kDirections % kAtOnce == 0);
+    std::array<std::optional<Eigen::Vector3d>, kAtOnce> eyes;
+    for (int begin = 0; begin < kDirections; begin += kAtOnce) {
+        parallelForEach(kAtOnce, 4, [&](int k) {
+            // So that the first ones are from all sides, too.
+            const int i = (begin + k) * 247 % kDirections;
+            const Eigen::Vector3d out = evenDirection(i, kDirections);
+            const bool faces = step || normal.isZero() || out.dot(normal) > kFacing;
+            eyes.at(static_cast<std::size_t>(k)) =
+                faces ? lookOut(record, out, anywhere) : std::nullopt;
+        });
+        for (const auto& eye : eyes) {
             if (eye && !f(*eye)) {
                 return;
             }
