@@ -147,7 +147,7 @@ class ViewPyramid {
 
 void FreeSpace::carve(const View& view, const SensorModel& sensor, const EmptyPixels& empty) {
     const DepthRectangles depth(view, empty);
-    const std::uint8_t done = sensor.exactDepth ? kProvenBit : kFreeBit;
+    const std::uint8_t done = sensor.exactDepth() ? kProvenBit : kFreeBit;
     const StereoCamera& camera = view.camera;
     const Pose camera_T_world = view.world_T_camera.inverse();
     const double radius = 0.87 * voxel_;  // of the ball around a voxel

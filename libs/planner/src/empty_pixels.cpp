@@ -51,12 +51,12 @@ void openBackground(const View& view, const SensorModel& sensor, int row,
         const float right = end < d.width ? d.at(end, row) : 0.0F;
         const bool hole = begin > d.firstColumn && end < d.width;
         const bool tooNear = std::max(left, right) > kAlmost * d.maxDisparity;
-        const bool oneSided = !sensor.exactDepth && hole &&
+        const bool oneSided = !sensor.exactDepth() && hole &&
                               static_cast<float>(end - begin) <= std::abs(right - left) + kWindow;
         for (int column = begin; column < end && !tooNear && !oneSided; ++column) {
             const auto behind = static_cast<double>(hidden[static_cast<std::size_t>(column)]);
             // Beyond all depths, or nothing there: `depth` is that of a disparity above its offset.
-            const bool all = sensor.exactDepth || behind + view.camera.doffs <= 0;
+            const bool all = sensor.exactDepth() || behind + view.camera.doffs <= 0;
             depth[d.index(column, row)] =
                 all ? farLimit : std::min(farLimit, static_cast<float>(view.camera.depth(behind)));
         }
@@ -93,7 +93,7 @@ EmptyPixels FreeSpace::emptyPixels(const View& view, const SensorModel& sensor,
         if (backgroundIsFree) {
             openBackground(view, sensor, row, empty.depth);
         }
-        for (int column = d.firstColumn; column < d.width && sensor.exactDepth; ++column) {
+        for (int column = d.firstColumn; column < d.width && sensor.exactDepth(); ++column) {
             if (!d.valid(column, row) && nothingTooNear(view, sensor, column, row)) {
                 empty.proven[d.index(column, row)] = 1;
                 empty.depth[d.index(column, row)] = static_cast<float>(sensor.farLimit);

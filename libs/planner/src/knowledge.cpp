@@ -94,8 +94,8 @@ void PlannerOptions::describe(OptionTable& table) {
     table.add("view_cost", viewCost, 0.01, 100, "m", "Cost of taking a view, as length of path");
     table.add("min_gain", minGain, 0, 1, "",
               "A view that promises less than this share of the surface known is not worth taking; "
-              "0 = 0.0007, with exact depth 0.0001; around an object 0.0003, with depth that is "
-              "noisy but not matched 0.0005");
+              "0 = 0.0007, with exact depth 0.0001; around an object (surface_box) 0.0003, or "
+              "0.0005 if depth is noisy but not matched");
     table.add("max_attempts", maxAttempts, 1, 100, "",
               "Different views of a tear that may fail before it is given up");
     table.add("unknown_weight", unknownWeight, 0, 100, "",
@@ -263,8 +263,8 @@ double Knowledge::minGain() const {
     // What exact depth promises is there if it can be seen at all. Around an object, views of folds
     // that only one camera looks into bring nothing, and matching gets better bit by bit.
     constexpr double kExact = 1e-4, kNoisy = 7e-4, kObject = 3e-4, kFolds = 5e-4;
-    const double inRooms = sensor_.exactDepth ? kExact : kNoisy;
-    const double aroundObject = sensor_.exactDepth || sensor_.matched ? kObject : kFolds;
+    const double inRooms = sensor_.exactDepth() ? kExact : kNoisy;
+    const double aroundObject = sensor_.exactDepth() || sensor_.matched() ? kObject : kFolds;
     const double automatic = surfaceBox() ? aroundObject : inRooms;
     return (options_.minGain > 0 ? options_.minGain : automatic) * summary_.area();
 }

@@ -13,8 +13,7 @@ SensorModel SensorModel::of(const View& view, const PlatformLimits& limits) {
     model.firstColumn = view.disparity.firstColumn;
     model.nearLimit = limits.nearLimit;
     model.clearance = limits.clearance;
-    model.exactDepth = limits.exactDepth;
-    model.matched = limits.matched;
+    model.depthKind = limits.depthKind;
     if (std::isfinite(view.disparity.maxDisparity)) {
         model.nearLimit = std::max(
             model.nearLimit, view.camera.depth(static_cast<double>(view.disparity.maxDisparity)));

@@ -119,7 +119,7 @@ bool ViewScorer::openTo(const SurfaceCell& cell, const Pose& world_T_camera) con
         return summary_->openTowards(cell.hiddenPosition, eye.cast<float>());
     };
     return open(world_T_camera.translation) &&
-           (sensor_.exactDepth ||
+           (sensor_.exactDepth() ||
             open(world_T_camera * Eigen::Vector3d(sensor_.camera.baseline, 0, 0)));
 }
 
@@ -135,8 +135,8 @@ ViewScorer::Benefit ViewScorer::benefit(const RiftRecord& record,
         constexpr double kClear = 0.3;  // a shorter mean is of normals that cancel: any side may do
         const double angle = facing.norm() > kClear ? ray.dot(facing.normalized()) / distance : 0.6;
         // Matching is worse at flat angles.
-        return !sensor_.matched ? std::clamp((angle - 0.15) / 0.1, 0.0, 1.0)
-                                : std::clamp((angle - 0.2) / 0.35, 0.0, 1.0);
+        return sensor_.matched() ? std::clamp((angle - 0.2) / 0.35, 0.0, 1.0)
+                                 : std::clamp((angle - 0.15) / 0.1, 0.0, 1.0);
     };
     // What a gap hides faces as the gap does. At other silhouettes the surface bends away over the
     // rim: what is to be seen faces outwards too, the more so if views from where the rim's own
@@ -244,7 +244,7 @@ void ViewScorer::forEachUnknown(const Pose& world_T_camera, const DepthBuffer& b
 
 /// Matching makes surface up where all is nearer than its range; other depth only misses it.
 double ViewScorer::nearShareOf(const DepthBuffer& buffer) const {
-    if (!sensor_.matched) {
+    if (!sensor_.matched()) {
         return 0;
     }
     const int firstColumn = sensor_.firstColumn / kPixels;

@@ -199,6 +199,22 @@ StereoObservation observe(const StereoRenderer& renderer, const CameraOptions& c
 
 // ---- Platform ----------------------------------------------------------------------------------
 
+namespace {
+
+DepthKind depthKindOf(NoiseOptions::Level level) {
+    switch (level) {
+        case NoiseOptions::Level::kN0:
+            return DepthKind::kExact;
+        case NoiseOptions::Level::kN3:
+            return DepthKind::kPixelwise;
+        case NoiseOptions::Level::kN4:
+            break;
+    }
+    return DepthKind::kMatched;
+}
+
+}  // namespace
+
 struct SimulatedPlatform::Parts {
     Parts(const SimulationOptions& given, std::uint64_t givenSeed)
         : options(given),
@@ -383,8 +399,7 @@ PlatformLimits SimulatedPlatform::limits() const {
     }
     limits.nearLimit = parts_->options.camera.nearLimit();
     limits.farLimit = parts_->options.camera.farLimit;
-    limits.exactDepth = parts_->options.noise.level == NoiseOptions::Level::kN0;
-    limits.matched = parts_->options.noise.level == NoiseOptions::Level::kN4;
+    limits.depthKind = depthKindOf(parts_->options.noise.level);
     return limits;
 }
 

@@ -217,7 +217,8 @@ FacetFilter::Smoothed FacetFilter::smoothed(const DisparityImage& image, int col
 }
 
 void FacetFilter::apply(DisparityImage& image, int radius) {
-    if (radius <= 0) {
+    const auto noisy = [](float sigma) { return sigma > kExact; };
+    if (radius <= 0 || std::none_of(image.sigma.begin(), image.sigma.end(), noisy)) {
         return;
     }
     fit(image, 1, false, planes_);

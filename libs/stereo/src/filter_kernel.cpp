@@ -196,7 +196,8 @@ void planeMiddles(const float* const* rows, int count, int first, std::size_t wi
             sur = hn::Add(sur, rowUR);
             svr = hn::Add(svr, hn::Mul(set(v), rowR));
         }
-        // Cramer's rule. The determinant is of whole numbers: 0, or 1 and more but for rounding.
+        // Cramer's rule. The determinant is of whole numbers small enough to be exact: 0, or 1 and
+        // more.
         const auto minus = [&](auto a, auto b, auto c, auto d) {
             return hn::Sub(hn::Mul(a, b), hn::Mul(c, d));
         };

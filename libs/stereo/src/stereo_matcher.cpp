@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "riftmap/stereo/stereo_matcher.h"
 
+#include <string>
+#include <utility>
+
 #include "riftmap/stereo/disparity_filters.h"
 #include "riftmap/stereo/disparity_refiner.h"
 #include "riftmap/stereo/grey.h"
@@ -79,7 +82,7 @@ void StereoOptions::describe(OptionTable& table) {
               "Disparity by which a farther surface is lower, at least.");
     table.add("refine", refine, 0, 10, "",
               "Iterations of least squares between the images after matching, along the surface's "
-              "slope (DisparityRefiner): half the error, two are enough; 0: none.");
+              "slope (DisparityRefiner): two halve the error on rendered views; 0: none.");
     table.add("sigma_floor", sigmaFloor, 0.001, 10.0, "px",
               "Least standard deviation of a matched disparity.");
     table.add("sigma_noise", sigmaNoise, 0.0, 100.0, "",

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The standard deviation that comes with a disparity is the one that its error has: error / sigma
 // of the correct matches (within 1 px of the truth) deviates by 0.8 to 1.25, whatever the noise of
-// the images, on real pairs and on rendered ones; so does that of noisy depth after smoothing.
+// the images, on real pairs and on rendered ones; so does that of noisy depth after smoothing, and
+// on rendered pairs that of refined matches.
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
@@ -131,8 +133,9 @@ void addView(WorldOptions::Name name, double sensorNoise, int refine, Deviation&
     }
 }
 
-/// Depth with noise of its own at each pixel, smoothed: of all pixels of a view.
-Deviation ofNoisyDepth(WorldOptions::Name name, double sigma) {
+/// Depth with noise of its own at each pixel, smoothed: of all pixels of a view, the error over
+/// sigma and over what it was before.
+std::array<Deviation, 2> ofNoisyDepth(WorldOptions::Name name, double sigma) {
     WorldOptions worldOptions;
     worldOptions.name = name;
     const World world = makeWorld(worldOptions);
@@ -148,11 +151,13 @@ Deviation ofNoisyDepth(WorldOptions::Name name, double sigma) {
     noise.sigmaD = sigma;
     StereoObservation observation = observe(renderer, rig, noise, pose, 1);
     const View view = ViewBuilder(StereoOptions()).build(observation);
-    Deviation all;
+    std::array<Deviation, 2> all;
     for (std::size_t i = 0; i < exact.disparity.size(); ++i) {
         if (exact.disparity[i] < kNoDisparity && view.disparity.disparity[i] < kNoDisparity) {
-            all.add(static_cast<double>(view.disparity.disparity[i] - exact.disparity[i]) /
-                    static_cast<double>(view.disparity.sigma[i]));
+            const auto error =
+                static_cast<double>(view.disparity.disparity[i] - exact.disparity[i]);
+            all[0].add(error / static_cast<double>(view.disparity.sigma[i]));
+            all[1].add(error / sigma);
         }
     }
     return all;
@@ -162,8 +167,10 @@ TEST(SigmaOfNoisyDepth, IsThatOfTheErrorAfterSmoothing) {
     for (const auto world : {WorldOptions::Name::kRoom, WorldOptions::Name::kRooms,
                              WorldOptions::Name::kSculpture, WorldOptions::Name::kCourtyard}) {
         for (const double sigma : {0.05, 0.25, 0.5}) {
-            const Deviation all = ofNoisyDepth(world, sigma);
-            std::cout << "depth, " << sigma << " px: " << all.value() << "\n";
+            const auto [all, left] = ofNoisyDepth(world, sigma);
+            std::cout << "depth, " << sigma << " px: " << all.value() << ", of the noise "
+                      << left.value() << " is left\n";
+            EXPECT_LT(left.value(), 0.6) << sigma;
             EXPECT_GT(all.n, 1000);
             EXPECT_GE(all.value(), kLeast) << sigma;
             EXPECT_LE(all.value(), kMost) << sigma;

@@ -161,6 +161,14 @@ TEST(FacetFilterProperty, IsLeastSquaresOnTheWindowsThatPassTheTest) {
         DisparityImage filtered = image;
         FacetFilter().apply(filtered, radius);
         const double share = shareOf(image);
+        if (std::abs(share - 0.1) < 1e-4) {
+            continue;  // rounding decides whether anything is done
+        }
+        if (share < 0.1) {
+            EXPECT_EQ(filtered.disparity, image.disparity) << "sample " << sample;
+            EXPECT_EQ(filtered.sigma, image.sigma) << "sample " << sample;
+            continue;
+        }
         for (int row = 0; row < image.height; ++row) {
             for (int column = 0; column < image.width; ++column) {
                 const std::size_t i = image.index(column, row);

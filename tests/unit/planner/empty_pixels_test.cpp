@@ -18,7 +18,7 @@ constexpr double kFar = 6;
 SensorModel sensorOf(const View& view, bool exactDepth) {
     PlatformLimits limits;
     limits.farLimit = kFar;
-    limits.exactDepth = exactDepth;
+    limits.depthKind = exactDepth ? DepthKind::kExact : DepthKind::kMatched;
     return SensorModel::of(view, limits);
 }
 

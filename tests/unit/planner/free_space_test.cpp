@@ -91,7 +91,7 @@ class Sky : public testing::Test {
         SensorModel s = sensorOf(test::viewOf(lookAt({0, 0, 0}, {1, 0, 0}), test::wall(3)));
         s.nearLimit = 0.5;
         s.clearance = 0.1;
-        s.exactDepth = true;
+        s.depthKind = DepthKind::kExact;
         return s;
     }();
     const Eigen::Vector3d ahead{3, 0, 0};
@@ -107,7 +107,7 @@ TEST_F(Sky, isFreeToFlyInOnceNothingCanBeNearerThanTheRange) {
 }
 
 TEST_F(Sky, isUnknownIfAMatchMayHaveBeenMissed) {
-    sensor.exactDepth = false;
+    sensor.depthKind = DepthKind::kMatched;
     lookAcross();
     lookAhead();
     EXPECT_EQ(space.at(ahead), State::kUnknown);

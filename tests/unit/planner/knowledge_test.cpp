@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
+#include <utility>
 
 #include "planner_scene.h"
 #include "riftmap/planner/view_planner.h"
@@ -117,9 +119,9 @@ TEST_F(Slit, theLeastGainFollowsTheDepthUnlessItIsGiven) {
     see(0.5);
     EXPECT_NEAR(knowledge.minGain(), 7e-4 * knowledge.summary().area(), 1e-12);
     PlatformLimits exact = limits();
-    exact.exactDepth = true;
+    exact.depthKind = DepthKind::kExact;
     PlatformLimits pixelwise = limits();
-    pixelwise.matched = false;
+    pixelwise.depthKind = DepthKind::kPixelwise;
     PlannerOptions given = options();
     given.minGain = 0.01;
     PlannerOptions object = options();

@@ -189,16 +189,17 @@ class BenefitOfATear : public testing::Test {
     ViewScorer::Benefit benefit(const Pose& pose) {
         PlatformLimits limits;
         limits.farLimit = 6;
-        limits.exactDepth = exact;
-        limits.matched = matched;
+        limits.depthKind = depth;
         const View view = test::viewOf(lookAt({0, 0, 0}, {1, 0, 0}), test::wall(2.0));
+        limits.nearLimit = 0.5;
         const ViewScorer scorer(SensorModel::of(view, limits), summary, ledger, space, 0.02,
                                 ViewScorer::Weights());
+        nearShare = scorer.score(pose).nearShare;
         return scorer.benefit(record, pose);
     }
+    double nearShare = 0;  ///< of the last view
     RiftRecord record;
-    bool exact = false;
-    bool matched = true;
+    DepthKind depth = DepthKind::kMatched;
     SurfaceSummary summary{0.08, 0.02};
 
  private:
@@ -238,6 +239,23 @@ TEST_F(BenefitOfATear, isNothingWhereAFoldIsInTheWay) {
     EXPECT_GT(area(before), 0.004);
 }
 
+TEST_F(BenefitOfATear, suffersFromNearSurfaceOnlyWhereDepthIsMatched) {
+    PixelGraph graph{GraphOptions()};
+    const View view = test::viewOf(lookAt({0, 0, 0}, {1, 0, 0}), test::wall(2.0));
+    graph.merge(view);
+    summary.update(graph, view);
+    const Pose close = lookAt({1.7, 0, 0}, {2, 0, 0});
+    benefit(close);
+    EXPECT_GT(nearShare, 0.9);
+    benefit(lookAt({1, 0, 0}, {2, 0, 0}));
+    EXPECT_EQ(nearShare, 0.0) << "far enough";
+    for (const DepthKind other : {DepthKind::kPixelwise, DepthKind::kExact}) {
+        depth = other;
+        benefit(close);
+        EXPECT_EQ(nearShare, 0.0);
+    }
+}
+
 TEST_F(BenefitOfATear, needsBothCamerasButWithExactDepth) {
     PixelGraph graph{GraphOptions()};
     const View view = test::viewOf(lookAt({0, 0, 0}, {1, 0, 0}), test::wall(2.0));
@@ -251,7 +269,7 @@ TEST_F(BenefitOfATear, needsBothCamerasButWithExactDepth) {
     EXPECT_GT(benefit(behind).area, 0.004) << "the right one farther from the wall";
     behind.rotation = Eigen::AngleAxisd(3.14159265, Eigen::Vector3d::UnitZ()).toRotationMatrix();
     EXPECT_EQ(benefit(behind).area, 0.0) << "the right one before it";
-    exact = true;
+    depth = DepthKind::kExact;
     EXPECT_GT(benefit(behind).area, 0.004);
 }
 
@@ -271,7 +289,7 @@ TEST_F(BenefitOfATear, countsAtFlatAnglesIfDepthIsNotMatched) {
     record.cell.hiddenNormal = {-1, 0, 0};
     const Eigen::Vector3d flat(-0.27, 0.96, 0);
     const double fromMatching = area(flat);
-    matched = false;
+    depth = DepthKind::kPixelwise;
     EXPECT_GT(area(flat), 3 * fromMatching);
 }
 

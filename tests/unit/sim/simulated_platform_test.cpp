@@ -157,14 +157,13 @@ TEST(SimulatedPlatform, StepsHaveALongest) {
     EXPECT_NO_THROW(platform->moveAlong({shifted(start, {0.5, 0, 0})}));
 }
 
-TEST(SimulatedPlatform, OnlyExactDepthProvesThatNothingIsThere) {
+TEST(SimulatedPlatform, SaysWhatItsDepthIsLike) {
     SimulationOptions options = smallRoom();
-    for (const auto level :
-         {NoiseOptions::Level::kN0, NoiseOptions::Level::kN3, NoiseOptions::Level::kN4}) {
+    for (const auto& [level, kind] :
+         {std::pair(Level::kN0, DepthKind::kExact), std::pair(Level::kN3, DepthKind::kPixelwise),
+          std::pair(Level::kN4, DepthKind::kMatched)}) {
         options.noise.level = level;
-        const PlatformLimits limits = makePlatform(options, 1)->limits();
-        EXPECT_EQ(limits.exactDepth, level == NoiseOptions::Level::kN0);
-        EXPECT_EQ(limits.matched, level == NoiseOptions::Level::kN4);
+        EXPECT_EQ(makePlatform(options, 1)->limits().depthKind, kind);
     }
 }
 

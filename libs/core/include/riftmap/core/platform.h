@@ -11,6 +11,18 @@
 
 namespace riftmap {
 
+/// Where depth comes from, and what can be said of it.
+enum class DepthKind {
+    /// Every pixel that meets a surface within the range is measured, without noise: one without
+    /// depth shows that there is none.
+    kExact,
+    /// Each pixel by itself, with noise, where both cameras see: as good at flat angles, and not
+    /// misled by surface nearer than the range.
+    kPixelwise,
+    /// By windows that are matched, which both mislead.
+    kMatched,
+};
+
 /// What the thing that carries the camera can do. World frame, metres, radians.
 struct PlatformLimits {
     enum class Kind {
@@ -28,12 +40,7 @@ struct PlatformLimits {
     double maxTilt = 1.5708;   ///< [rad]
     double nearLimit = 0.0;    ///< surfaces nearer than this are not measured [m]
     double farLimit = 1e3;     ///< nor those farther [m]
-    /// Every pixel that meets a surface within the range is measured: one without a match shows
-    /// that there is none (exact depth). A matcher cannot say so.
-    bool exactDepth = false;
-    /// Depth comes from windows that are matched, which flat angles and surface nearer than the
-    /// range mislead; otherwise from each pixel by itself.
-    bool matched = true;
+    DepthKind depthKind = DepthKind::kMatched;  ///< what the camera's depth is like
 };
 
 /// A path that touches a surface or leaves the workspace.

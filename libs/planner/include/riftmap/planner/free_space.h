@@ -41,7 +41,7 @@ class FreeSpace {
     void declareFreeOutside(const Eigen::AlignedBox3d& surfaces);
     /// Free because the camera is there with its clearance.
     void declareFree(const Eigen::Vector3d& centre, double radius);
-    /// What the pixels without a match show. With `sensor.exactDepth`: nothing up to the far limit,
+    /// What the pixels without a match show. With exact depth: nothing up to the far limit,
     /// proven, but only where the part of the ray before the near limit, where surface has no match
     /// either, is within the clearance or in voxels proven free: by declareFreeOutside(), or by
     /// earlier views that had the whole voxel in their image, measured at every pixel. With

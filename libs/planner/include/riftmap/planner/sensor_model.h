@@ -16,8 +16,10 @@ struct SensorModel {
     double farLimit = 1e3;      ///< depth z [m]; nor are those farther
     double sigmaDisparity = 0;  ///< median of the valid pixels [px]
     double clearance = 0;       ///< around the camera there is nothing nearer than this [m]
-    bool exactDepth = false;    ///< PlatformLimits::exactDepth
-    bool matched = true;        ///< PlatformLimits::matched
+    DepthKind depthKind = DepthKind::kMatched;  ///< of the platform
+
+    bool exactDepth() const { return depthKind == DepthKind::kExact; }
+    bool matched() const { return depthKind == DepthKind::kMatched; }
 
     /// As the last view was, within the platform's range.
     static SensorModel of(const View& view, const PlatformLimits& limits);

@@ -22,6 +22,8 @@ namespace riftmap {
 /// the median residual of planes through 3 x 3 pixels. Only that part shrinks, to what the fit
 /// leaves of it (h, of a pixel's variance); what is common to neighbours stays, and residuals
 /// beyond chance are added (e): sigma'^2 = sigma^2 (w (h + e) + 1 - w).
+/// A pixel's sigma stands for its whole window: where sigma differs much from pixel to pixel, that
+/// of the better ones comes out too small.
 ///
 /// A few hundred operations a pixel, rows in parallel. Same bytes for any number of threads. Keeps
 /// its buffers: one object is used by one thread at a time.

@@ -24,8 +24,8 @@ class StereoMatcher {
     virtual void compute(const cv::Mat& left, const cv::Mat& right, DisparityImage& out) = 0;
 };
 
-/// The matcher that the options name. Null for MatcherKind::kGiven. Throws ConfigError for options
-/// that exclude one another.
+/// The matcher that the options name, with DisparityRefiner after it where `refine` > 0. Null for
+/// MatcherKind::kGiven. Throws ConfigError for options that exclude one another.
 std::unique_ptr<StereoMatcher> makeStereoMatcher(const StereoOptions& options);
 
 }  // namespace riftmap

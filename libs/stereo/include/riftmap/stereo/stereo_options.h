@@ -52,7 +52,9 @@ struct StereoOptions {
     int silhouetteRows = 4;         ///< the same up and down [rows]
     double silhouetteStep = 4;      ///< what counts as farther: lower disparity by more [px]
 
-    int refine = 0;  ///< iterations of DisparityRefiner after the matcher; 0: none
+    /// Iterations of DisparityRefiner after the matcher, by makeStereoMatcher() (a matcher by
+    /// itself knows nothing of it); 0: none. They find parts of a pixel whatever `subpixel` says.
+    int refine = 0;
 
     double sigmaFloor = 0.08;     ///< least standard deviation of a disparity [px]
     double sigmaNoise = 3.5;      ///< its growth with the images' noise over the curvature
@@ -60,7 +62,8 @@ struct StereoOptions {
     double sigmaSlope = 0.3;      ///< its growth with the change of disparity from pixel to pixel
     double imageNoise = 0;        ///< standard deviation of a sample; 0: measured [grey levels]
     double sigmaGiven = 0.1;      ///< standard deviation of a given disparity [px]
-    int facetRadius = 3;  ///< given disparities are smoothed over so much (FacetFilter) [px]
+    int facetRadius =
+        3;  ///< given disparities are smoothed over so much (FacetFilter) [px]; 0: not
     /// Depth known worse than that (standard deviation) shows that the space before it is free, but
     /// is no surface of the map [m]; 0: no limit.
     double maxDepthSigma = 0;
