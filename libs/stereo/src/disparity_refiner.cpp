@@ -28,7 +28,7 @@ float between(const std::array<float, 4>& p, float t) {
 
 void DisparityRefiner::smooth(DisparityImage& image) {
     const auto width = static_cast<std::size_t>(image.width);
-    const std::size_t stride = width + 2 * kReach;
+    const std::size_t stride = width + kernel::kPlaneRoom;
     padded_.assign(stride * static_cast<std::size_t>(image.height), kNoDisparity);
     const auto paddedRow = [&](int row) {
         return padded_.data() + static_cast<std::size_t>(row) * stride;
@@ -87,7 +87,7 @@ void DisparityRefiner::move(DisparityImage& image) {
     const auto width = static_cast<std::size_t>(image.width);
     parallelFor(static_cast<std::size_t>(image.height), kRows,
                 [&](std::size_t begin, std::size_t end) {
-                    std::vector<float> scratch(6 * (width + 2 * kReach), 0.0F);
+                    std::vector<float> scratch(6 * (width + kernel::kPlaneRoom), 0.0F);
                     for (auto row = static_cast<int>(begin); row < static_cast<int>(end); ++row) {
                         std::array<kernel::ComparedRow, 2 * kReach + 1> rows{};
                         const int first = std::max(-kReach, -row);

@@ -151,13 +151,13 @@ void FacetFilter::fit(const DisparityImage& image, int radius, bool quadratic, F
     if (image.height < basis.side || image.width < basis.side) {
         return;
     }
-    parallelFor(static_cast<std::size_t>(image.height - basis.side + 1), kRows,
-                [&](std::size_t begin, std::size_t end) {
-                    ColumnSums sums(image.width);
-                    for (std::size_t r = begin; r < end; ++r) {
-                        fitRow(static_cast<int>(r) + radius, sums);
-                    }
-                });
+    const int rows = image.height - basis.side + 1;
+    parallelFor(static_cast<std::size_t>(rows), kRows, [&](std::size_t begin, std::size_t end) {
+        ColumnSums sums(image.width);
+        for (std::size_t r = begin; r < end; ++r) {
+            fitRow(static_cast<int>(r) + radius, sums);
+        }
+    });
 }
 
 /// Share of the variance that neighbours do not have in common, at most 1.

@@ -219,7 +219,7 @@ void moveRow(const ComparedRow* rows, int count, int own, std::size_t width, con
     constexpr float kMostMove = 0.5F;      // [px]
     constexpr float kRounding = 1.0F / 6;  // variance of the difference of two rounded samples
     constexpr float kLeastPixels = 10;
-    const std::size_t stride = width + 2 * kPlaneReach;
+    const std::size_t stride = width + kPlaneRoom;
     along(0, width, [&](auto tag, std::size_t i) {
         auto n = hn::Zero(tag);
         auto g = n, e = n, gg = n, ge = n, ee = n;
@@ -245,7 +245,7 @@ void moveRow(const ComparedRow* rows, int count, int own, std::size_t width, con
         const auto set = [&](float x) { return hn::Set(tag, x); };
         const auto window = [&](std::size_t k) {
             auto sum = hn::Zero(tag);
-            for (std::size_t u = 0; u <= 2 * kPlaneReach; ++u) {
+            for (std::size_t u = 0; u <= kPlaneRoom; ++u) {
                 sum = hn::Add(sum, hn::LoadU(tag, scratch + k * stride + i + u));
             }
             return sum;

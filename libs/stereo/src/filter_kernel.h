@@ -31,6 +31,8 @@ void growSigma(const float* d, const float* up, const float* down, std::size_t w
 
 /// Rows and columns around a pixel that planeMiddles() looks at [px].
 inline constexpr int kPlaneReach = 3;
+/// Numbers that a padded row has more than pixels: kPlaneReach on either side.
+inline constexpr std::size_t kPlaneRoom = 2 * std::size_t{kPlaneReach};
 
 /// The plane, by least squares, through the disparities around pixel i of a row that differ from
 /// its own by `most` at most: out[i] is its value in the middle, or the pixel's own disparity where
@@ -50,7 +52,7 @@ struct ComparedRow {
 
 /// Step 3 of DisparityRefiner for the pixels of a row. rows[k], k in [0, count): those within
 /// kPlaneReach rows, `own` is the row's own index among them. `matched`: sigma of the matcher.
-/// `scratch` has room for 6 (width + 2 kPlaneReach) numbers and holds zeros where the window
+/// `scratch` has room for 6 (width + kPlaneRoom) numbers and holds zeros where the window
 /// reaches beyond the row, before the first call and after each.
 void moveRow(const ComparedRow* rows, int count, int own, std::size_t width, const float* matched,
              float least, float most, float* scratch, float* d, float* sigma);
