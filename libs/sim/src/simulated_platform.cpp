@@ -89,7 +89,8 @@ bool insideSolid(const RayCaster& caster, const Point& p, bool indoor) {
     constexpr int kMost = 16;  // of 27
     int backs = 0;
     for (int i = 0; i < 27; ++i) {
-        const Point d(i % 3 - 0.99, i / 3 % 3 - 0.98, i / 9 - 0.97);  // along no edge
+        const int x = i % 3, y = i / 3 % 3, z = i / 9;
+        const Point d(x - 0.99, y - 0.98, z - 0.97);  // along no edge
         const auto hit = caster.cast(p, d);
         if (hit && hit->normal.dot(d) > 0) {
             backs += !indoor || caster.cast(p + (hit->t + 1e-3) * d, d) ? 1 : 0;

@@ -270,7 +270,8 @@ void moveRow(const ComparedRow* rows, int count, int own, std::size_t width, con
         const auto there = hn::Clamp(hn::Add(here, by), set(least), set(most));
         hn::StoreU(hn::IfThenElse(moves, there, here), tag, d + i);
         const auto inverse = hn::Add(hn::Div(set(1), prior), hn::Div(gg, rest));
-        const auto left = hn::Sqrt(hn::Add(hn::Div(set(1), inverse), hn::Mul(set(0.2F), prior)));
+        const auto stays = hn::Mul(prior, hn::Add(set(0.2F), hn::Mul(set(0.4F), prior)));
+        const auto left = hn::Sqrt(hn::Add(hn::Div(set(1), inverse), stays));
         hn::StoreU(hn::IfThenElse(moves, left, hn::LoadU(tag, sigma + i)), tag, sigma + i);
     });
 }

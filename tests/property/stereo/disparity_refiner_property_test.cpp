@@ -169,7 +169,7 @@ void moved(const Sample& s, Image& d, Image& sigma) {
             d[i] = std::clamp(d[i] + std::clamp(-ge / (gg + rest / prior), -0.5, 0.5),
                               static_cast<double>(s.matches.minDisparity),
                               static_cast<double>(s.matches.maxDisparity));
-            sigma[i] = std::sqrt(1 / (1 / prior + gg / rest) + 0.2 * prior);
+            sigma[i] = std::sqrt(1 / (1 / prior + gg / rest) + 0.2 * prior + 0.4 * prior * prior);
         }
     }
 }

@@ -26,9 +26,10 @@ namespace riftmap {
 ///    left of e (at least that of rounded samples) and s the sigma of the matcher: where there is
 ///    little texture the matcher has the say. At most half a pixel.
 ///
-/// Last, smoothed once more. The new sigma^2 is 1 / (1 / s^2 + var(g) / r) + 0.2 s^2: fitted to
-/// rendered views of objects and rooms with known error. On real pairs it is up to a third too
-/// small.
+/// Last, smoothed once more. The new sigma^2 is 1 / (1 / s^2 + var(g) / r) + 0.2 s^2 + 0.4 s^4
+/// [px]: fitted to rendered views of objects and rooms with known error; a match that the matcher
+/// doubts (s of half a pixel and more) is mostly a wrong one, and stays doubtful. On real pairs it
+/// is up to a third too small.
 ///
 /// Work in proportion to the pixels and iterations, rows in parallel. Same bytes for any number of
 /// threads. Keeps its images: one object is used by one thread at a time.
