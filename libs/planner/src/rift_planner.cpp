@@ -284,20 +284,33 @@ std::optional<Eigen::Vector3d> Choice::lookOut(const RiftRecord& record, const E
     const double resolution = k_.resolution();
     const double nearest = 1.02 * k_.sensor().nearLimit;
     const double stride = std::max(resolution, 0.5 * k_.space().voxelSize());
-    double step = resolution;
-    for (double s = 3 * resolution; s < k_.sensor().farLimit; s += step) {
+    const auto freeAt = [&](const Eigen::Vector3d& at) {
+        return k_.space().at(at) == FreeSpace::State::kFree;
+    };
+    const auto mayLook = [&](const Eigen::Vector3d& at) {
+        return (anywhere ? k_.mayBeAt(at) : std::isfinite(k_.space().distanceTo(at))) &&
+               !RiftLedger::tried(record, at);
+    };
+    // The place first: most lines lead to none, and what is in the way takes longer to tell.
+    const double first = 3 * resolution;
+    double place = first;
+    for (; place < k_.sensor().farLimit; place += freeAt(p + place * out) ? stride : resolution) {
+        if (place > nearest && mayLook(p + place * out)) {
+            break;
+        }
+    }
+    if (place >= k_.sensor().farLimit) {
+        return std::nullopt;
+    }
+    for (double s = first; s <= place;) {
         const Eigen::Vector3d at = p + s * out;
-        const bool free = k_.space().at(at) == FreeSpace::State::kFree;
-        step = free ? stride : resolution;
+        const bool free = freeAt(at);
         if (!free && k_.graph().anyWithin(at.cast<float>(), static_cast<float>(0.5 * resolution))) {
             return std::nullopt;
         }
-        if (s > nearest && (anywhere ? k_.mayBeAt(at) : std::isfinite(k_.space().distanceTo(at))) &&
-            !RiftLedger::tried(record, at)) {
-            return at;
-        }
+        s += free ? stride : resolution;
     }
-    return std::nullopt;
+    return p + place * out;
 }
 
 /// Calls f(eye) for places from where a tear can be seen, found by looking out of it to all sides,
