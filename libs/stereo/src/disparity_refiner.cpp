@@ -24,6 +24,14 @@ float between(const std::array<float, 4>& p, float t) {
                             t * (3 * (p[1] - p[2]) + p[3] - p[0])));
 }
 
+/// The rows within kReach of a row that the image has.
+struct RowsAround {
+    RowsAround(int row, int height)
+        : first(std::max(-kReach, -row)), count(std::min(kReach, height - 1 - row) - first + 1) {}
+    int first;  ///< of them, from the row itself
+    int count;
+};
+
 }  // namespace
 
 void DisparityRefiner::smooth(DisparityImage& image) {
@@ -38,8 +46,7 @@ void DisparityRefiner::smooth(DisparityImage& image) {
     });
     parallelForEach(image.height, kRows, [&](int row) {
         std::array<const float*, 2 * kReach + 1> rows{};
-        const int first = std::max(-kReach, -row);
-        const int count = std::min(kReach, image.height - 1 - row) - first + 1;
+        const auto [first, count] = RowsAround(row, image.height);
         for (int k = 0; k < count; ++k) {
             rows[static_cast<std::size_t>(k)] = paddedRow(row + first + k);
         }
@@ -90,8 +97,7 @@ void DisparityRefiner::move(DisparityImage& image) {
                     std::vector<float> scratch(6 * (width + kernel::kPlaneRoom), 0.0F);
                     for (auto row = static_cast<int>(begin); row < static_cast<int>(end); ++row) {
                         std::array<kernel::ComparedRow, 2 * kReach + 1> rows{};
-                        const int first = std::max(-kReach, -row);
-                        const int count = std::min(kReach, image.height - 1 - row) - first + 1;
+                        const auto [first, count] = RowsAround(row, image.height);
                         for (int k = 0; k < count; ++k) {
                             const std::size_t start = image.index(0, row + first + k);
                             rows.at(static_cast<std::size_t>(k)) = {compared_.data() + start,

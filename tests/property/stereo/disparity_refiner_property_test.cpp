@@ -6,26 +6,18 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdint>
-#include <cstdlib>
 #include <iostream>
 #include <opencv2/core.hpp>
 #include <random>
 #include <vector>
 
 #include "riftmap/stereo/disparity_refiner.h"
+#include "test_seed.h"
 
 namespace riftmap {
 namespace {
-
-std::uint64_t seedOfRun() {
-    const char* given = std::getenv("RIFTMAP_TEST_SEED");
-    return given != nullptr ? std::strtoull(given, nullptr, 10)
-                            : static_cast<std::uint64_t>(
-                                  std::chrono::steady_clock::now().time_since_epoch().count());
-}
 
 using Image = std::vector<double>;
 

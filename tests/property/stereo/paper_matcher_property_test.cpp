@@ -7,10 +7,8 @@
 
 #include <algorithm>
 #include <bit>
-#include <chrono>
 #include <cmath>
 #include <cstdint>
-#include <cstdlib>
 #include <iostream>
 #include <opencv2/core.hpp>
 #include <random>
@@ -20,17 +18,10 @@
 
 #include "reference_matcher.h"
 #include "riftmap/stereo/paper_matcher.h"
+#include "test_seed.h"
 
 namespace riftmap {
 namespace {
-
-/// From the environment (RIFTMAP_TEST_SEED) to repeat a failure, else new in each run.
-std::uint64_t seedOfRun() {
-    const char* given = std::getenv("RIFTMAP_TEST_SEED");
-    return given != nullptr ? std::strtoull(given, nullptr, 10)
-                            : static_cast<std::uint64_t>(
-                                  std::chrono::steady_clock::now().time_since_epoch().count());
-}
 
 struct Sample {
     cv::Mat left, right;

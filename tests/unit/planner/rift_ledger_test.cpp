@@ -190,7 +190,6 @@ class BenefitOfATear : public testing::Test {
         PlatformLimits limits;
         limits.farLimit = 6;
         limits.depthKind = depth;
-        const View view = test::viewOf(lookAt({0, 0, 0}, {1, 0, 0}), test::wall(2.0));
         limits.nearLimit = 0.5;
         const ViewScorer scorer(SensorModel::of(view, limits), summary, ledger, space, 0.02,
                                 ViewScorer::Weights());
@@ -198,6 +197,13 @@ class BenefitOfATear : public testing::Test {
         return scorer.benefit(record, pose);
     }
     double nearShare = 0;  ///< of the last view
+    const View view = test::viewOf(lookAt({0, 0, 0}, {1, 0, 0}), test::wall(2.0));
+    /// The map has the wall at x = 2.
+    void seeTheWall() {
+        PixelGraph graph{GraphOptions()};
+        graph.merge(view);
+        summary.update(graph, view);
+    }
     RiftRecord record;
     DepthKind depth = DepthKind::kMatched;
     SurfaceSummary summary{0.08, 0.02};
@@ -219,10 +225,7 @@ TEST_F(BenefitOfATear, liesWhereTheHiddenSurfaceFaces) {
 }
 
 TEST_F(BenefitOfATear, isNothingWhereAFoldIsInTheWay) {
-    PixelGraph graph{GraphOptions()};
-    const View view = test::viewOf(lookAt({0, 0, 0}, {1, 0, 0}), test::wall(2.0));
-    graph.merge(view);
-    summary.update(graph, view);
+    seeTheWall();
     record.cell.openPosition = record.cell.hiddenPosition = {2.1F, 0, 0};
     record.cell.hiddenNormal = {0, 1, 0};
     const Eigen::Vector3d before(1.6, 1, 0);
@@ -240,10 +243,7 @@ TEST_F(BenefitOfATear, isNothingWhereAFoldIsInTheWay) {
 }
 
 TEST_F(BenefitOfATear, suffersFromNearSurfaceOnlyWhereDepthIsMatched) {
-    PixelGraph graph{GraphOptions()};
-    const View view = test::viewOf(lookAt({0, 0, 0}, {1, 0, 0}), test::wall(2.0));
-    graph.merge(view);
-    summary.update(graph, view);
+    seeTheWall();
     const Pose close = lookAt({1.7, 0, 0}, {2, 0, 0});
     benefit(close);
     EXPECT_GT(nearShare, 0.9);
@@ -257,10 +257,7 @@ TEST_F(BenefitOfATear, suffersFromNearSurfaceOnlyWhereDepthIsMatched) {
 }
 
 TEST_F(BenefitOfATear, needsBothCamerasButWithExactDepth) {
-    PixelGraph graph{GraphOptions()};
-    const View view = test::viewOf(lookAt({0, 0, 0}, {1, 0, 0}), test::wall(2.0));
-    graph.merge(view);
-    summary.update(graph, view);
+    seeTheWall();
     record.cell.openPosition = record.cell.hiddenPosition = {2.05F, 0, 0};
     record.cell.hiddenNormal = {0, 1, 0};
     Pose behind;  // the left camera

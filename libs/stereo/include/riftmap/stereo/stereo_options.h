@@ -62,8 +62,8 @@ struct StereoOptions {
     double sigmaSlope = 0.3;      ///< its growth with the change of disparity from pixel to pixel
     double imageNoise = 0;        ///< standard deviation of a sample; 0: measured [grey levels]
     double sigmaGiven = 0.1;      ///< standard deviation of a given disparity [px]
-    int facetRadius =
-        3;  ///< given disparities are smoothed over so much (FacetFilter) [px]; 0: not
+    /// Given disparities are smoothed over so much to each side (FacetFilter) [px]; 0: not.
+    int facetRadius = 3;
     /// Depth known worse than that (standard deviation) shows that the space before it is free, but
     /// is no surface of the map [m]; 0: no limit.
     double maxDepthSigma = 0;
