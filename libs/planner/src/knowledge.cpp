@@ -92,10 +92,11 @@ void PlannerOptions::describe(OptionTable& table) {
     table.add("voxel_size", voxelSize, 0, 10, "m",
               "Edge of the voxels of the known free space; 0 = by the size of the workspace");
     table.add("view_cost", viewCost, 0.01, 100, "m", "Cost of taking a view, as length of path");
-    table.add("min_gain", minGain, 0, 1, "",
-              "A view that promises less than this share of the surface known is not worth taking; "
-              "0 = 0.0007, with exact depth 0.0001; around an object (surface_box) 0.0003, or "
-              "0.0005 if depth is noisy but not matched");
+    table.add(
+        "min_gain", minGain, 0, 1, "",
+        "A view that promises less than this share of the surface known is not worth taking; "
+        "0 = 0.0007, with exact depth 0.0001; around an object (surface_box) 0.0003, with exact "
+        "depth 0.0004, with noisy depth that is not matched 0.0006");
     table.add("max_attempts", maxAttempts, 1, 100, "",
               "Different views of a tear that may fail before it is given up");
     table.add("unknown_weight", unknownWeight, 0, 100, "",
@@ -262,10 +263,14 @@ std::optional<Knowledge::Place> Knowledge::placeAt(const Eigen::Vector3d& eye) c
 double Knowledge::minGain() const {
     // What exact depth promises is there if it can be seen at all. Around an object, views of folds
     // that only one camera looks into bring nothing, and matching gets better bit by bit.
-    constexpr double kExact = 1e-4, kNoisy = 7e-4, kObject = 3e-4, kFolds = 5e-4;
-    const double inRooms = sensor_.exactDepth() ? kExact : kNoisy;
-    const double aroundObject = sensor_.exactDepth() || sensor_.matched() ? kObject : kFolds;
-    const double automatic = surfaceBox() ? aroundObject : inRooms;
+    struct Shares {
+        double inRooms, aroundObject;
+    };
+    constexpr Shares kExact{1e-4, 4e-4}, kPixelwise{7e-4, 6e-4}, kMatched{7e-4, 3e-4};
+    const Shares& shares = sensor_.exactDepth() ? kExact
+                           : sensor_.matched()  ? kMatched
+                                                : kPixelwise;
+    const double automatic = surfaceBox() ? shares.aroundObject : shares.inRooms;
     return (options_.minGain > 0 ? options_.minGain : automatic) * summary_.area();
 }
 

@@ -27,6 +27,7 @@ ViewScorer::Weights weightsFor(const Knowledge& k, const ObjectMemory& memory) {
         weights.hidden = 0.65 * memory.tears.share();
         weights.doubt = memory.doubt.share();
         weights.vain = weights.vainUnmatched = 0.4;
+        weights.gapsByLine = true;
     }
     return weights;
 }

@@ -45,6 +45,12 @@ struct Sums {
 
 constexpr int kParts = 4;  ///< of a cell, along each axis
 
+/// The largest whole number that is no larger: std::floor() is a call without SSE 4.1.
+int wholeBelow(float x) {
+    const int towardsZero = static_cast<int>(x);
+    return towardsZero - (x < static_cast<float>(towardsZero) ? 1 : 0);
+}
+
 /// In SurfaceCell::parts.
 std::uint64_t partBit(const Eigen::Vector3i& part) {
     return std::uint64_t{1} << ((part.z() * kParts + part.y()) * kParts + part.x());
@@ -216,30 +222,49 @@ std::size_t SurfaceSummary::indexInBlock(const Eigen::Vector3i& cell) {
     return static_cast<std::size_t>(row * kCellsPerSide + cell.x());
 }
 
-bool SurfaceSummary::openTowards(const Eigen::Vector3f& place, const Eigen::Vector3f& eye) const {
-    constexpr float kFirst = 2.2F, kLast = 4 * kParts, kStep = 0.75F;  // [parts]
+bool SurfaceSummary::openTowards(const Eigen::Vector3f& place, const Eigen::Vector3f& eye,
+                                 float reach) const {
+    constexpr float kFirst = 2.2F, kStep = 0.75F;  // [parts]
     static_assert(kParts == 4 && kCellsPerSide == 8);
-    const Eigen::Vector3f start = place * (kParts / static_cast<float>(cell_));
-    const Eigen::Vector3f way = eye * (kParts / static_cast<float>(cell_)) - start;
-    const float end = std::min(kLast, way.norm());
+    const float scale = kParts / static_cast<float>(cell_);
+    const Eigen::Vector3f start = scale * place;
+    const Eigen::Vector3f way = scale * eye - start;
     const Eigen::Vector3f out = way.normalized();
+    const Eigen::Array3f inverse =
+        out.unaryExpr([](float x) { return 1 / std::copysign(std::max(std::abs(x), 1e-6F), x); });
+    // Beyond all blocks there is nothing.
+    const Eigen::Array3f edges = (inverse > 0).select(scale * box_.max(), scale * box_.min());
+    const float outside = ((edges - start.array()) * inverse).minCoeff();
+    const float end = std::min({kParts * reach, way.norm(), outside});
     std::uint64_t last = 0;  // block; no key is 0
     auto block = blocks_.end();
-    for (float s = kFirst; s < end; s += kStep) {
-        const Eigen::Vector3i part = (start + s * out).array().floor().cast<int>();
+    for (float s = kFirst; s < end;) {
+        const Eigen::Vector3f p = start + s * out;
+        const Eigen::Vector3i part = p.unaryExpr([](float x) { return wholeBelow(x); });
         const std::uint64_t key = pack(part.unaryExpr([](int x) { return x >> 5; }));
         if (key != last) {
             last = key;
             block = blocks_.find(key);
         }
-        if (block == blocks_.end()) {
-            continue;
+        int empty = kParts * kCellsPerSide;  // [parts] edge of a cube here that holds nothing
+        if (block != blocks_.end()) {
+            const Eigen::Vector3i cell = part.unaryExpr([](int x) { return x >> 2; });
+            const Eigen::Vector3i in = cell.unaryExpr([](int x) { return x & 7; });
+            const std::uint64_t held = block->second.parts[indexInBlock(in)];
+            if (held != 0) {
+                if ((held & partBit(part - kParts * cell)) != 0) {
+                    return false;
+                }
+                s += kStep;
+                continue;
+            }
+            empty = kParts;
         }
-        const Eigen::Vector3i cell = part.unaryExpr([](int x) { return x >> 2; });
-        const Eigen::Vector3i in = cell.unaryExpr([](int x) { return x & 7; });
-        if ((block->second.parts[indexInBlock(in)] & partBit(part - kParts * cell)) != 0) {
-            return false;
-        }
+        // The last of these places that surely lies in that cube.
+        const Eigen::Array3f low = part.unaryExpr([&](int x) { return x & -empty; }).cast<float>();
+        const Eigen::Array3f side = (inverse > 0).select(low + static_cast<float>(empty), low);
+        const float across = ((side - p.array()) * inverse).minCoeff();
+        s += kStep * static_cast<float>(std::max(1, static_cast<int>(across / kStep)));
     }
     return true;
 }
@@ -325,6 +350,7 @@ void SurfaceSummary::update(const PixelGraph& graph, const View& view, const See
         cellCount_ += rebuilt[i].cells.size() - former_[i].cells.size();
         coarseArea_ += coarseIn(rebuilt[i]) - coarseIn(former_[i]);
         if (!rebuilt[i].cells.empty()) {
+            box_.extend(rebuilt[i].box.cast<float>());
             blocks_[changed_[i]] = std::move(rebuilt[i]);
         } else if (it != blocks_.end()) {
             blocks_.erase(it);

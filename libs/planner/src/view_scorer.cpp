@@ -112,11 +112,13 @@ double ViewScorer::besideRim(const SurfaceCell& cell) const {
     return kWidth * static_cast<double>(cell.rim);
 }
 
-/// Whether nothing close before what the cell hides is in the way of the cameras: of both, but for
-/// exact depth, which needs no partner.
+/// Whether nothing before what the cell hides (gapsByLine; else nothing close before it) is in the
+/// way of the cameras: of both, but for exact depth, which needs no partner.
 bool ViewScorer::openTo(const SurfaceCell& cell, const Pose& world_T_camera) const {
+    constexpr float kClose = 4;  // [cells]
+    const float reach = weights_.gapsByLine ? kFar : kClose;
     const auto open = [&](const Eigen::Vector3d& eye) {
-        return summary_->openTowards(cell.hiddenPosition, eye.cast<float>());
+        return summary_->openTowards(cell.hiddenPosition, eye.cast<float>(), reach);
     };
     return open(world_T_camera.translation) &&
            (sensor_.exactDepth() ||
@@ -131,9 +133,12 @@ ViewScorer::Benefit ViewScorer::benefit(const RiftRecord& record,
     }
     const Eigen::Vector3d ray = eye - record.cell.openPosition.cast<double>();
     const double distance = ray.norm();
-    const auto qualityOn = [&](const Eigen::Vector3d& facing) {
+    const auto angleTo = [&](const Eigen::Vector3d& facing) {
         constexpr double kClear = 0.3;  // a shorter mean is of normals that cancel: any side may do
-        const double angle = facing.norm() > kClear ? ray.dot(facing.normalized()) / distance : 0.6;
+        return facing.norm() > kClear ? ray.dot(facing.normalized()) / distance : 0.6;
+    };
+    const auto qualityOn = [&](const Eigen::Vector3d& facing) {
+        const double angle = angleTo(facing);
         // Matching is worse at flat angles.
         return sensor_.matched() ? std::clamp((angle - 0.2) / 0.35, 0.0, 1.0)
                                  : std::clamp((angle - 0.15) / 0.1, 0.0, 1.0);
@@ -149,7 +154,10 @@ ViewScorer::Benefit ViewScorer::benefit(const RiftRecord& record,
     const double coarseQuality = qualityOn(facing);
     double tornQuality = coarseQuality;
     if (record.cell.hidden > 0) {
-        tornQuality = qualityOn(record.cell.hiddenNormal.cast<double>());
+        const Eigen::Vector3d hidden = record.cell.hiddenNormal.cast<double>();
+        // Along open lines about so much of what the dragon's gaps hid was seen.
+        const bool hint = weights_.gapsByLine && !sensor_.matched();
+        tornQuality = hint ? 0.5 * (1 + angleTo(hidden)) : qualityOn(hidden);
         if (tornQuality > 0 && !openTo(record.cell, world_T_camera)) {
             tornQuality = 0;
         }
@@ -391,10 +399,12 @@ ViewScorer::Seen ViewScorer::sights(const Pose& world_T_camera) const {
             const Eigen::Vector3f p =
                 rotation * (cell.hidden > 0 ? cell.hiddenPosition : cell.openPosition) +
                 translation;
-            if (visible(buffer, p, margin)) {
+            const bool drawn = visible(buffer, p, margin);
+            const bool byLine = weights_.gapsByLine && cell.hidden > 0;
+            if (drawn || (byLine && visible(buffer, p, kFar))) {
                 const Benefit b = benefit(*open_[i], world_T_camera);
                 put(2 * i, b.torn);
-                put(2 * i + 1, b.coarse);
+                put(2 * i + 1, drawn ? b.coarse : 0.0);
             }
         }
     }

@@ -192,10 +192,11 @@ class BenefitOfATear : public testing::Test {
         limits.depthKind = depth;
         limits.nearLimit = 0.5;
         const ViewScorer scorer(SensorModel::of(view, limits), summary, ledger, space, 0.02,
-                                ViewScorer::Weights());
+                                weights);
         nearShare = scorer.score(pose).nearShare;
         return scorer.benefit(record, pose);
     }
+    ViewScorer::Weights weights;
     double nearShare = 0;  ///< of the last view
     const View view = test::viewOf(lookAt({0, 0, 0}, {1, 0, 0}), test::wall(2.0));
     /// The map has the wall at x = 2.
@@ -240,6 +241,35 @@ TEST_F(BenefitOfATear, isNothingWhereAFoldIsInTheWay) {
     record.cell.openPosition = record.cell.hiddenPosition = {2.4F, 0, 0};  // too far to be a fold
     record.cell.coarse = 0;
     EXPECT_GT(area(before), 0.004);
+}
+
+TEST_F(BenefitOfATear, goesByTheWholeLineAroundAnObject) {
+    seeTheWall();
+    depth = DepthKind::kExact;
+    record.cell.openPosition = record.cell.hiddenPosition = {2.4F, 0, 0};
+    const Eigen::Vector3d before(1.6, 1, 0);
+    for (const Eigen::Vector3f& facing : {Eigen::Vector3f(0, 1, 0), Eigen::Vector3f(-1, 0, 0)}) {
+        record.cell.hiddenNormal = facing;
+        weights.gapsByLine = false;
+        EXPECT_GT(area(before), 0.004) << "the wall is too far to be a fold";
+        weights.gapsByLine = true;
+        EXPECT_EQ(area(before), 0.0) << "the wall is in the way";
+    }
+    // How the gap faces is a hint only.
+    const Eigen::Vector3d behind(2.6, 1, 0);
+    const double full = area(behind);
+    record.cell.hiddenNormal = {0, 1, 0};
+    const double facing = area(behind);
+    record.cell.hiddenNormal = {1, 0, 0};
+    const double aside = area(behind);
+    record.cell.hiddenNormal = {0, -1, 0};
+    EXPECT_LT(area(behind), 0.05 * facing) << "away";
+    EXPECT_GT(facing, aside);
+    EXPECT_GT(aside, full);
+    EXPECT_GT(full, 0.3 * facing) << "turned away by 101 degrees";
+    depth = DepthKind::kMatched;
+    record.cell.hiddenNormal = {-1, 0, 0};
+    EXPECT_EQ(area(behind), 0.0) << "matching needs a view from before it";
 }
 
 TEST_F(BenefitOfATear, suffersFromNearSurfaceOnlyWhereDepthIsMatched) {

@@ -54,7 +54,9 @@ std::vector<Point> allSides() {
 /// A pot with walls of some thickness (0: none), and what was seen of it.
 class Pot {
  public:
-    explicit Pot(double wall, const std::vector<Point>& eyes = allSides()) : wall_(wall) {
+    /// `board`: a small one stands before the side of larger y, 0.35 m away.
+    explicit Pot(double wall, const std::vector<Point>& eyes = allSides(), bool board = false)
+        : wall_(wall), board_(board) {
         for (const Point& eye : eyes) {
             const View view = test::viewOf(
                 lookAt(eye, Point::Zero()),
@@ -83,6 +85,9 @@ class Pot {
         std::optional<double> nearest;
         const Point half(kHalf, kHalf, kHalf);
         hitPot({-half, half}, origin, ray, nearest);
+        if (board_) {
+            hitPot({Point(-0.06, 0.75, -0.11), Point(0.06, 0.76, 0.01)}, origin, ray, nearest);
+        }
         if (wall_ > 0) {
             const Point within(wall_, wall_, 0);
             hitPot({-half + Point(wall_, wall_, wall_), half - within}, origin, ray, nearest);
@@ -109,6 +114,7 @@ class Pot {
     }
 
     double wall_;
+    bool board_;
     PixelGraph graph_{graphOptions()};
     Knowledge knowledge_{graph_, limits(), options()};
 };
@@ -143,6 +149,26 @@ TEST(ThinShells, doNotHoldASideThatWasNotSeenThoughTheInsideLiesBehindIt) {
         EXPECT_FALSE(isBefore && shells.hold(place)) << p.transpose();
     }
     EXPECT_GT(before, 30U);
+    EXPECT_GT(held, 50U) << "the test needs an inside that is held";
+}
+
+TEST(ThinShells, doNotHoldAPatchThatWasNotSeenAmongWhatWas) {
+    std::vector<Point> eyes = allSides();
+    eyes.emplace_back(0, -1.5, 0.8);  // over the rim, to just above the patch
+    const Pot pot(0.0, eyes, true);
+    const ThinShells shells = pot.shells();
+    std::size_t before = 0;
+    std::size_t heldBefore = 0;
+    std::size_t held = 0;
+    for (const FreeSpace::Frontier& place : pot.frontier()) {
+        const Point p = place.centre.cast<double>();
+        const bool isBefore = p.y() > 0.43 && std::abs(p.x()) < 0.3 && std::abs(p.z()) < 0.3;
+        before += isBefore ? 1 : 0;
+        held += shells.hold(place) ? 1 : 0;
+        heldBefore += isBefore && shells.hold(place) ? 1 : 0;
+    }
+    EXPECT_EQ(heldBefore, 0U) << "of " << before;
+    EXPECT_GT(before, 10U);
     EXPECT_GT(held, 50U) << "the test needs an inside that is held";
 }
 

@@ -79,11 +79,12 @@ class SurfaceSummary {
     const std::vector<Block>& former() const { return former_; }
     /// Key of the block of a cell.
     static std::uint64_t blockOf(std::uint64_t cell);
-    /// False if something known stands close before a place, as seen from `eye`: if a part
-    /// (Block::parts) that holds a vertex is met on the line between them, at places 0.75 of its
-    /// edge apart, no farther than four cells from the place. The first 2.2 edges of a part do not
-    /// count, for there stands the rim that the place lies beside. About 0.2 us.
-    bool openTowards(const Eigen::Vector3f& place, const Eigen::Vector3f& eye) const;
+    /// False if something known stands before a place, as seen from `eye`: if a part (Block::parts)
+    /// that holds a vertex is met on the line between them, at places 0.75 of its edge apart, no
+    /// farther than `reach` cells from the place. The first 2.2 edges of a part do not count, for
+    /// there stands the rim that the place lies beside. What is empty is passed over: 0.2 us for
+    /// four cells, about 0.5 us for a line out of an object.
+    bool openTowards(const Eigen::Vector3f& place, const Eigen::Vector3f& eye, float reach) const;
     /// Nothing if the cell holds no vertex.
     const SurfaceCell* find(std::uint64_t key) const;
     std::uint64_t keyOf(const Eigen::Vector3d& point) const;
@@ -113,6 +114,7 @@ class SurfaceSummary {
 
     double cell_, resolution_;
     std::map<std::uint64_t, Block> blocks_;
+    Eigen::AlignedBox3f box_;  ///< around all blocks there ever were
     std::vector<std::uint64_t> changed_;
     std::vector<Block> former_;
     std::size_t cellCount_ = 0;

@@ -18,9 +18,11 @@ namespace riftmap {
 /// around from the free space before the frontier near it (of 12 voxels along each axis), most of
 /// what stops the view is the back of known surface, or surface that was seen from both sides.
 /// Before the outside of a body, and in one with thick walls, it is the front; fewer than 100 backs
-/// are not judged, for a fold of the surface may look like that. Walls
-/// thinner than a voxel of the frontier (2.5 cm at a resolution of 5 mm, see Knowledge::unseen())
-/// cannot be told from those of no thickness. Map frame, metres. Thread-safe once it is made.
+/// are not judged, for a fold of the surface may look like that. A place where less than a quarter
+/// of what stops the view is backs does not count either: it is before a patch of the outside that
+/// was not seen yet, with the inside behind it. Walls thinner than a voxel of the
+/// frontier (2.5 cm at a resolution of 5 mm, see Knowledge::unseen()) cannot be told from those of
+/// no thickness. Map frame, metres. Thread-safe once it is made.
 class ThinShells {
  public:
     /// `frontier`: all of `space`. `space` must know the surface of `summary`, and is not needed

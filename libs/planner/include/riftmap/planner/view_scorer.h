@@ -47,6 +47,10 @@ class ViewScorer {
         /// The same where pixels beside it had no disparity: what did not match once will hardly
         /// match from elsewhere, while what was hidden may be seen from another side.
         double vainUnmatched = 0.5;
+        /// Whether a gap is seen is told by the lines from it to the cameras, all the way, in place
+        /// of the depth image, and how it faces is a hint only. For an object: the surface of a
+        /// room, seen from afar, is too sparse, and lines slip through it.
+        bool gapsByLine = false;
     };
 
     /// Everything must outlive the scorer and stay as it is.
