@@ -257,7 +257,7 @@ TEST_F(BenefitOfATear, goesByTheWholeLineAroundAnObject) {
     }
     // How the gap faces is a hint only.
     const Eigen::Vector3d behind(2.6, 1, 0);
-    const double full = area(behind);
+    const double obtuse = area(behind);
     record.cell.hiddenNormal = {0, 1, 0};
     const double facing = area(behind);
     record.cell.hiddenNormal = {1, 0, 0};
@@ -265,8 +265,8 @@ TEST_F(BenefitOfATear, goesByTheWholeLineAroundAnObject) {
     record.cell.hiddenNormal = {0, -1, 0};
     EXPECT_LT(area(behind), 0.05 * facing) << "away";
     EXPECT_GT(facing, aside);
-    EXPECT_GT(aside, full);
-    EXPECT_GT(full, 0.3 * facing) << "turned away by 101 degrees";
+    EXPECT_GT(aside, obtuse);
+    EXPECT_GT(obtuse, 0.3 * facing) << "turned away by 101 degrees";
     depth = DepthKind::kMatched;
     record.cell.hiddenNormal = {-1, 0, 0};
     EXPECT_EQ(area(behind), 0.0) << "matching needs a view from before it";

@@ -47,9 +47,10 @@ class ViewScorer {
         /// The same where pixels beside it had no disparity: what did not match once will hardly
         /// match from elsewhere, while what was hidden may be seen from another side.
         double vainUnmatched = 0.5;
-        /// Whether a gap is seen is told by the lines from it to the cameras, all the way, in place
-        /// of the depth image, and how it faces is a hint only. For an object: the surface of a
-        /// room, seen from afar, is too sparse, and lines slip through it.
+        /// Whether sights() has a gap in view is told by the lines from it to the cameras through
+        /// the known surface, all the way, in place of the depth image, and unless depth is matched
+        /// how the gap faces is a hint only. For an object: the surface of a room, seen from afar,
+        /// is too sparse, and lines slip through it.
         bool gapsByLine = false;
     };
 
@@ -65,7 +66,8 @@ class ViewScorer {
     /// Unknown places that the view would look into.
     std::vector<Eigen::Vector3d> unknownSeen(const Pose& world_T_camera) const;
     /// Area that seeing this open cell from there would bring, hidden by nothing but what stands
-    /// close before it [m^2], and the quality of that view of it, 0 (in vain) to 1.
+    /// close before it, or with gapsByLine anywhere before its gap [m^2], and the quality of that
+    /// view of it, 0 (in vain) to 1.
     struct Benefit {
         double area = 0, quality = 0;
         double torn = 0, coarse = 0;  ///< shares of what the tear and its coarse part are worth
@@ -91,7 +93,8 @@ class ViewScorer {
         std::vector<Sight> sights;
         double nearShare = 0;  ///< as in ViewScore
     };
-    /// What a view would see of them. Surface known and unknown hides what lies behind it.
+    /// What a view would see of them. Surface known and unknown hides what lies behind it, but for
+    /// gaps (gapsByLine), which only known surface hides.
     /// Thread-safe.
     Seen sights(const Pose& world_T_camera) const;
     /// Of a cell's two items or a place's, the first.
