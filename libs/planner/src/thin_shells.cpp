@@ -63,8 +63,8 @@ ThinShells::ThinShells(const FreeSpace& space, const SurfaceSummary& summary,
         }
     }
     for (std::size_t i = 0; i < frontier.size(); ++i) {
-        // A place beside it that hardly sees a back itself is before the outside, of a side not
-        // seen yet that the inside lies behind.
+        // Among them a place that hardly sees a back itself is before the outside: a patch not seen
+        // yet that the inside lies behind.
         if (within.contains(SurfaceSummary::keyAt(pieceOf(frontier[i]))) &&
             4 * seen[i].backs >= seen[i].all) {
             inside_.insert(SurfaceSummary::keyAt(voxelOf(frontier[i].centre.cast<double>())));
