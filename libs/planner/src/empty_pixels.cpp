@@ -84,19 +84,63 @@ bool FreeSpace::nothingTooNear(const View& view, const SensorModel& sensor, int 
     return true;
 }
 
+/// The same for all pixels of a rectangle at once, both corners included: true if all voxels are
+/// proven free that may lie before them up to the near limit; false says nothing.
+bool FreeSpace::nothingTooNear(const View& view, const SensorModel& sensor,
+                               const Eigen::Vector2i& first, const Eigen::Vector2i& last) const {
+    const StereoCamera& c = view.camera;
+    Eigen::AlignedBox3d box;
+    for (const int column : {first.x(), last.x()}) {
+        for (const int row : {first.y(), last.y()}) {
+            const Eigen::Vector3d ray((column - c.cx) / c.fx, (row - c.cy) / c.fy, 1.0);
+            box.extend(view.world_T_camera * Eigen::Vector3d(sensor.nearLimit * ray));
+        }
+    }
+    box.extend(view.world_T_camera.translation);
+    const Eigen::Vector3i low = voxelOf(box.min());
+    const Eigen::Vector3i high = voxelOf(box.max());
+    if (!inside(low) || !inside(high)) {
+        return false;
+    }
+    for (int z = low.z(); z <= high.z(); ++z) {
+        for (int y = low.y(); y <= high.y(); ++y) {
+            for (int x = low.x(); x <= high.x(); ++x) {
+                if ((voxels_[index({x, y, z})] & (kProvenBit | kSurfaceBit)) != kProvenBit) {
+                    return false;
+                }
+            }
+        }
+    }
+    return true;
+}
+
 EmptyPixels FreeSpace::emptyPixels(const View& view, const SensorModel& sensor,
                                    bool backgroundIsFree) const {
     const DisparityImage& d = view.disparity;
     EmptyPixels empty{std::vector<float>(d.disparity.size(), 0.0F),
                       std::vector<std::uint8_t>(d.disparity.size(), 0)};
-    parallelForEach(d.height, 8, [&](int row) {
-        if (backgroundIsFree) {
-            openBackground(view, sensor, row, empty.depth);
-        }
-        for (int column = d.firstColumn; column < d.width && sensor.exactDepth(); ++column) {
-            if (!d.valid(column, row) && nothingTooNear(view, sensor, column, row)) {
-                empty.proven[d.index(column, row)] = 1;
-                empty.depth[d.index(column, row)] = static_cast<float>(sensor.farLimit);
+    if (backgroundIsFree) {
+        parallelForEach(d.height, 8,
+                        [&](int row) { openBackground(view, sensor, row, empty.depth); });
+    }
+    if (!sensor.exactDepth()) {
+        return empty;
+    }
+    constexpr int kTile = 32;  // [px]
+    parallelForEach((d.height + kTile - 1) / kTile, 1, [&](int strip) {
+        const int top = strip * kTile;
+        const int bottom = std::min(top + kTile, d.height) - 1;
+        for (int left = d.firstColumn; left < d.width; left += kTile) {
+            const int right = std::min(left + kTile, d.width) - 1;
+            const bool all = nothingTooNear(view, sensor, {left, top}, {right, bottom});
+            for (int row = top; row <= bottom; ++row) {
+                for (int column = left; column <= right; ++column) {
+                    if (!d.valid(column, row) &&
+                        (all || nothingTooNear(view, sensor, column, row))) {
+                        empty.proven[d.index(column, row)] = 1;
+                        empty.depth[d.index(column, row)] = static_cast<float>(sensor.farLimit);
+                    }
+                }
             }
         }
     });

@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 
+#include "lazy_greatest.h"
 #include "riftmap/core/parallel.h"
 #include "riftmap/planner/thin_shells.h"
 #include "view_choice.h"
@@ -93,7 +95,10 @@ void Choice::addPlacesAround(const Eigen::AlignedBox3d& box) {
 
 /// Gain of views of an object as its tour has it.
 ViewScore Choice::scoreAround(const Pose& pose) const {
-    const ViewScorer::Seen seen = scorer_.sights(pose);
+    return scoreOf(scorer_.sights(pose));
+}
+
+ViewScore Choice::scoreOf(const ViewScorer::Seen& seen) const {
     ViewScore score;
     score.nearShare = seen.nearShare;
     score.gain = SeenItems(worth_).gain(TourView{seen.sights, 0});
@@ -115,6 +120,28 @@ ViewScore Choice::scoreAround(const Pose& pose) const {
     std::sort(score.cells.begin(), score.cells.end());
     score.cells.erase(std::unique(score.cells.begin(), score.cells.end()), score.cells.end());
     return score;
+}
+
+/// The best of the candidates alone is left.
+void Choice::keepBestAround() {
+    std::vector<ViewScorer::Seen> seen(candidates_.size());
+    std::vector<double> utilities(candidates_.size());
+    parallelForEach(seen.size(), 4, [&](std::size_t i) {
+        Candidate& c = candidates_[i];
+        seen[i] = scorer_.sightsAtMost(c.pose);
+        rate(c, scoreOf(seen[i]));
+        utilities[i] = c.utility;
+    });
+    const std::size_t best = greatestOf(utilities, [&](std::span<const std::size_t> some) {
+        parallelForEach(some.size(), 1, [&](std::size_t k) {
+            const std::size_t i = some[k];
+            Candidate& c = candidates_[i];
+            scorer_.dropHidden(seen[i].sights, seen[i].gaps, c.pose);
+            rate(c, scoreOf(seen[i]));
+            utilities[i] = c.utility;
+        });
+    });
+    candidates_ = {Candidate(candidates_[best < seen.size() ? best : 0])};
 }
 
 /// Places of the frontier that a view looks at.
@@ -146,12 +173,14 @@ std::optional<ViewPlan> Choice::makeAround(const Eigen::AlignedBox3d& box) {
         }
     }
     std::vector<TourView> views(candidates_.size());
+    std::vector<std::vector<std::uint32_t>> gaps(candidates_.size());
     parallelForEach(candidates_.size(), 4, [&](std::size_t i) {
-        ViewScorer::Seen seen = scorer_.sights(candidates_[i].pose);
+        ViewScorer::Seen seen = scorer_.sightsAtMost(candidates_[i].pose);
         candidates_[i].score.nearShare = seen.nearShare;
         views[i].fromStart = candidates_[i].path;
         if (seen.nearShare <= 0.3) {
             views[i].sights = std::move(seen.sights);
+            gaps[i] = std::move(seen.gaps);
         }
     });
     const double ball = box.sizes().mean() / 2 + k_.limits().clearance;
@@ -160,12 +189,15 @@ std::optional<ViewPlan> Choice::makeAround(const Eigen::AlignedBox3d& box) {
     options.minGain = k_.minGain();
     options.settled = 0.3 * k_.summary().area();
     const ViewTour tour = planTour(
-        views, worth_,
+        std::move(views), worth_,
         [&](std::size_t a, std::size_t b) {
             return wayAround(candidates_[a].pose.translation, candidates_[b].pose.translation,
                              box.center(), ball);
         },
-        options);
+        options,
+        [&](std::size_t i, TourView& view) {
+            scorer_.dropHidden(view.sights, gaps[i], candidates_[i].pose);
+        });
     pool_.clear();
     for (std::size_t i = 1; i < tour.views.size(); ++i) {
         pool_.push_back(candidates_[tour.views[i]].pose);
@@ -176,8 +208,7 @@ std::optional<ViewPlan> Choice::makeAround(const Eigen::AlignedBox3d& box) {
     candidates_ = {Candidate(candidates_[tour.views.front()])};
     for (int round = 0; round < 2; ++round) {
         refine(Candidate(candidates_.front()));
-        scoreFrom(0);
-        candidates_ = {Candidate(*best())};
+        keepBestAround();
     }
     return planFor(candidates_.front());
 }

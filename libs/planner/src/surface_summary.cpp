@@ -159,6 +159,14 @@ SurfaceCell toCell(const Sums& s, std::uint64_t key, double cell) {
     return c;
 }
 
+constexpr int kSide = 8;  ///< cells of a block along each edge
+
+/// Of a cell, counted from the block's corner, in lists of all its cells.
+std::size_t indexInBlock(const Eigen::Vector3i& cell) {
+    const std::ptrdiff_t row = std::ptrdiff_t{cell.z()} * kSide + cell.y();
+    return static_cast<std::size_t>(row * kSide + cell.x());
+}
+
 double coarseIn(const SurfaceSummary::Block& block) {
     double area = 0;
     for (const SurfaceCell& cell : block.cells) {
@@ -216,16 +224,40 @@ const SurfaceCell* SurfaceSummary::find(std::uint64_t key) const {
     return c != cells.end() && c->key == key ? &*c : nullptr;
 }
 
-/// Of a cell, counted from the block's corner, in lists of all its cells.
-std::size_t SurfaceSummary::indexInBlock(const Eigen::Vector3i& cell) {
-    const std::ptrdiff_t row = std::ptrdiff_t{cell.z()} * kCellsPerSide + cell.y();
-    return static_cast<std::size_t>(row * kCellsPerSide + cell.x());
+/// Spreads the blocks over a grid, so that a line that meets many need not search for each.
+void SurfaceSummary::spreadBlocks() {
+    constexpr double kMost = 1 << 20;
+    Eigen::AlignedBox3i box;
+    for (const auto& [key, block] : blocks_) {
+        box.extend(unpack(key));
+    }
+    const Eigen::Vector3i size = box.isEmpty() ? Eigen::Vector3i::Zero().eval()
+                                               : (box.sizes() + Eigen::Vector3i::Ones()).eval();
+    grid_ = {};
+    if (size.cast<double>().prod() > kMost) {
+        return;  // a few of them lie far off
+    }
+    grid_.low = box.min();
+    grid_.size = size;
+    grid_.blocks.assign(static_cast<std::size_t>(size.prod()), nullptr);
+    for (const auto& [key, block] : blocks_) {
+        grid_.blocks[grid_.index(unpack(key) - grid_.low)] = &block;
+    }
+}
+
+const SurfaceSummary::Block* SurfaceSummary::blockAt(const Eigen::Vector3i& at) const {
+    const Eigen::Vector3i in = at - grid_.low;
+    if (grid_.holds(in)) {
+        return grid_.blocks[grid_.index(in)];
+    }
+    const auto it = grid_.blocks.empty() ? blocks_.find(pack(at)) : blocks_.end();
+    return it == blocks_.end() ? nullptr : &it->second;
 }
 
 bool SurfaceSummary::openTowards(const Eigen::Vector3f& place, const Eigen::Vector3f& eye,
                                  float reach) const {
     constexpr float kFirst = 2.2F, kStep = 0.75F;  // [parts]
-    static_assert(kParts == 4 && kCellsPerSide == 8);
+    static_assert(kParts == 4 && kCellsPerSide == kSide);
     const float scale = kParts / static_cast<float>(cell_);
     const Eigen::Vector3f start = scale * place;
     const Eigen::Vector3f way = scale * eye - start;
@@ -236,21 +268,15 @@ bool SurfaceSummary::openTowards(const Eigen::Vector3f& place, const Eigen::Vect
     const Eigen::Array3f edges = (inverse > 0).select(scale * box_.max(), scale * box_.min());
     const float outside = ((edges - start.array()) * inverse).minCoeff();
     const float end = std::min({kParts * reach, way.norm(), outside});
-    std::uint64_t last = 0;  // block; no key is 0
-    auto block = blocks_.end();
     for (float s = kFirst; s < end;) {
         const Eigen::Vector3f p = start + s * out;
         const Eigen::Vector3i part = p.unaryExpr([](float x) { return wholeBelow(x); });
-        const std::uint64_t key = pack(part.unaryExpr([](int x) { return x >> 5; }));
-        if (key != last) {
-            last = key;
-            block = blocks_.find(key);
-        }
+        const Block* block = blockAt(part.unaryExpr([](int x) { return x >> 5; }));
         int empty = kParts * kCellsPerSide;  // [parts] edge of a cube here that holds nothing
-        if (block != blocks_.end()) {
+        if (block != nullptr) {
             const Eigen::Vector3i cell = part.unaryExpr([](int x) { return x >> 2; });
             const Eigen::Vector3i in = cell.unaryExpr([](int x) { return x & 7; });
-            const std::uint64_t held = block->second.parts[indexInBlock(in)];
+            const std::uint64_t held = block->parts[indexInBlock(in)];
             if (held != 0) {
                 if ((held & partBit(part - kParts * cell)) != 0) {
                     return false;
@@ -356,6 +382,7 @@ void SurfaceSummary::update(const PixelGraph& graph, const View& view, const See
             blocks_.erase(it);
         }
     }
+    spreadBlocks();
 }
 
 /// Parts of the block's cells that hold a vertex while neither they nor a part that shares a face

@@ -47,6 +47,8 @@ class Choice {
     void keepPool();
     void refine(const Candidate& best);
     ViewScore scoreAround(const Pose& pose) const;
+    ViewScore scoreOf(const ViewScorer::Seen& seen) const;
+    void keepBestAround();
     void rate(Candidate& candidate, const ViewScore& score) const;
     void scoreFrom(std::size_t first);
     void preselect();

@@ -127,6 +127,11 @@ bool ViewScorer::openTo(const SurfaceCell& cell, const Pose& world_T_camera) con
 
 ViewScorer::Benefit ViewScorer::benefit(const RiftRecord& record,
                                         const Pose& world_T_camera) const {
+    return benefit(record, world_T_camera, true);
+}
+
+ViewScorer::Benefit ViewScorer::benefit(const RiftRecord& record, const Pose& world_T_camera,
+                                        bool withLines) const {
     const Eigen::Vector3d& eye = world_T_camera.translation;
     if (RiftLedger::tried(record, eye)) {
         return {};
@@ -158,7 +163,7 @@ ViewScorer::Benefit ViewScorer::benefit(const RiftRecord& record,
         // Along open lines about so much of what the dragon's gaps hid was seen.
         const bool hint = weights_.gapsByLine && !sensor_.matched();
         tornQuality = hint ? 0.5 * (1 + angleTo(hidden)) : qualityOn(hidden);
-        if (tornQuality > 0 && !openTo(record.cell, world_T_camera)) {
+        if (withLines && tornQuality > 0 && !openTo(record.cell, world_T_camera)) {
             tornQuality = 0;
         }
     }
@@ -371,6 +376,27 @@ std::optional<std::size_t> ViewScorer::frontierOf(std::uint32_t item) const {
 }
 
 ViewScorer::Seen ViewScorer::sights(const Pose& world_T_camera) const {
+    Seen seen = sightsAtMost(world_T_camera);
+    dropHidden(seen.sights, seen.gaps, world_T_camera);
+    seen.gaps.clear();
+    return seen;
+}
+
+void ViewScorer::dropHidden(std::vector<Sight>& sights, const std::vector<std::uint32_t>& gaps,
+                            const Pose& world_T_camera) const {
+    auto gap = gaps.begin();
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < sights.size(); ++i) {
+        const bool isGap = gap != gaps.end() && *gap == i;
+        gap += isGap ? 1 : 0;
+        if (!isGap || openTo(open_[sights[i].item / 2]->cell, world_T_camera)) {
+            sights[kept++] = sights[i];
+        }
+    }
+    sights.resize(kept);
+}
+
+ViewScorer::Seen ViewScorer::sightsAtMost(const Pose& world_T_camera) const {
     const Pose camera_T_world = world_T_camera.inverse();
     std::vector<const BlockView*> seen;
     DepthBuffer buffer = draw(camera_T_world, seen);
@@ -402,8 +428,12 @@ ViewScorer::Seen ViewScorer::sights(const Pose& world_T_camera) const {
             const bool drawn = visible(buffer, p, margin);
             const bool byLine = weights_.gapsByLine && cell.hidden > 0;
             if (drawn || (byLine && visible(buffer, p, kFar))) {
-                const Benefit b = benefit(*open_[i], world_T_camera);
+                const Benefit b = benefit(*open_[i], world_T_camera, false);
+                const std::size_t count = result.sights.size();
                 put(2 * i, b.torn);
+                if (cell.hidden > 0 && result.sights.size() > count) {
+                    result.gaps.push_back(static_cast<std::uint32_t>(count));
+                }
                 put(2 * i + 1, drawn ? b.coarse : 0.0);
             }
         }

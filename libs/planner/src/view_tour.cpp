@@ -3,6 +3,10 @@
 
 #include <algorithm>
 #include <limits>
+#include <span>
+
+#include "lazy_greatest.h"
+#include "riftmap/core/parallel.h"
 
 namespace riftmap {
 
@@ -110,6 +114,81 @@ std::vector<std::size_t> bestOrder(const std::vector<TourView>& views,
     return order;
 }
 
+/// Picks one view after the other; what is not certain of their sights is settled as far as that
+/// takes.
+class Picker {
+ public:
+    Picker(std::vector<TourView>& views, const std::vector<float>& worth, const WayLength& between,
+           const TourOptions& options, const SightsSettle& settle)
+        : views_(&views),
+          between_(&between),
+          options_(options),
+          settle_(&settle),
+          seen_(worth),
+          settled_(views.size(), settle ? 0 : 1),
+          gains_(views.size()) {
+        parallelForEach(views.size(), 16, [&](std::size_t v) { gains_[v] = seen_.gain(views[v]); });
+    }
+
+    /// Puts the view that is worth most for its cost into the tour; false if none is worth it.
+    bool pick(std::vector<std::size_t>& stops) {
+        std::vector<Insertion> places(views_->size());
+        std::vector<double> costs(views_->size());
+        // What a view adds only shrinks as others are picked: the last value is an upper bound.
+        std::vector<double> utilities(views_->size(), 0.0);
+        for (std::size_t v = 0; v < views_->size(); ++v) {
+            if (gains_[v] > options_.minGain) {
+                places[v] = cheapestInsertion(*views_, *between_, stops, v);
+                costs[v] = options_.viewCost + std::max(0.0, places[v].detour);
+                utilities[v] = gains_[v] / costs[v];
+            }
+        }
+        const std::size_t best = greatestOf(utilities, [&](std::span<const std::size_t> some) {
+            dropBeyondMost(some);
+            parallelForEach(some.size(), 1, [&](std::size_t i) {
+                const std::size_t v = some[i];
+                weigh(v);
+                utilities[v] = gains_[v] > options_.minGain ? gains_[v] / costs[v] : 0.0;
+            });
+        });
+        if (best == views_->size()) {
+            return false;
+        }
+        seen_.add((*views_)[best]);
+        gains_[best] = 0;  // the same view once more shows nothing new
+        stops.insert(stops.begin() + static_cast<std::ptrdiff_t>(places[best].position), best);
+        return true;
+    }
+
+ private:
+    /// Once enough views were settled the others are left out.
+    void dropBeyondMost(std::span<const std::size_t> some) {
+        for (const std::size_t v : some) {
+            if (settled_[v] == 0 && count_++ >= options_.maxSettled) {
+                settled_[v] = 1;
+                (*views_)[v].sights.clear();
+            }
+        }
+    }
+
+    void weigh(std::size_t v) {
+        if (settled_[v] == 0) {
+            (*settle_)(v, (*views_)[v]);
+            settled_[v] = 1;
+        }
+        gains_[v] = seen_.gain((*views_)[v]);
+    }
+
+    std::vector<TourView>* views_;
+    const WayLength* between_;
+    TourOptions options_;
+    const SightsSettle* settle_;
+    SeenItems seen_;
+    std::vector<std::uint8_t> settled_;
+    std::size_t count_ = 0;      ///< of those that were settled
+    std::vector<double> gains_;  ///< at most, of views not picked
+};
+
 }  // namespace
 
 double SeenItems::gain(const TourView& view) const {
@@ -148,35 +227,12 @@ double tourCost(const std::vector<TourView>& views, const std::vector<float>& wo
     return cost;
 }
 
-ViewTour planTour(const std::vector<TourView>& views, const std::vector<float>& worth,
-                  const WayLength& between, const TourOptions& options) {
+ViewTour planTour(std::vector<TourView> views, const std::vector<float>& worth,
+                  const WayLength& between, const TourOptions& options,
+                  const SightsSettle& settle) {
     std::vector<std::size_t> stops;
-    SeenItems seen(worth);
-    // What a view adds only shrinks as others are picked: the last value is an upper bound.
-    std::vector<double> bound(views.size(), kNever);
-    while (stops.size() < options.maxViews) {
-        std::size_t best = views.size();
-        double bestUtility = 0;
-        Insertion bestPlace;
-        for (std::size_t v = 0; v < views.size(); ++v) {
-            const Insertion place = cheapestInsertion(views, between, stops, v);
-            const double cost = options.viewCost + std::max(0.0, place.detour);
-            if (bound[v] <= options.minGain || bound[v] / cost <= bestUtility) {
-                continue;
-            }
-            bound[v] = seen.gain(views[v]);
-            if (bound[v] > options.minGain && bound[v] / cost > bestUtility) {
-                best = v;
-                bestUtility = bound[v] / cost;
-                bestPlace = place;
-            }
-        }
-        if (best == views.size()) {
-            break;
-        }
-        seen.add(views[best]);
-        bound[best] = 0;  // the same view once more shows nothing new
-        stops.insert(stops.begin() + static_cast<std::ptrdiff_t>(bestPlace.position), best);
+    Picker picker(views, worth, between, options, settle);
+    while (stops.size() < options.maxViews && picker.pick(stops)) {
     }
     ViewTour tour;
     if (stops.empty()) {

@@ -16,7 +16,7 @@ namespace {
 
 /// The scorer's picture of a scene, and the same worked out cell by cell.
 struct Watched {
-    Watched(std::uint32_t seed, double cell, double resolution_)
+    Watched(std::uint32_t seed, double cell, double resolution_, bool withGaps = false)
         : scene(seed),
           graph(optionsFor(resolution_)),
           summary(cell, resolution_),
@@ -29,10 +29,12 @@ struct Watched {
         for (const Pose& pose : {lookAt({0, 0, 0}, {1, 0, 0}), lookAt({0, 0.4, 0.2}, {2, 0, 0})}) {
             const View view = scene.see(pose);
             graph.merge(view);
-            summary.update(graph, view);
-            ledger.update(summary);
             sensor = SensorModel::of(view, limits);
-            space.carve(view, sensor, space.emptyPixels(view, sensor, false));
+            const EmptyPixels empty = space.emptyPixels(view, sensor, false);
+            seen.add(view, empty);
+            summary.update(graph, view, withGaps ? &seen : nullptr);
+            ledger.update(summary);
+            space.carve(view, sensor, empty);
         }
     }
     ViewScorer scorer(const ViewScorer::Weights& weights = {0.5}) const {
@@ -50,6 +52,7 @@ struct Watched {
 
     test::RandomScene scene;
     PixelGraph graph;
+    SeenThrough seen;
     SurfaceSummary summary;
     RiftLedger ledger;
     FreeSpace space;
@@ -78,17 +81,12 @@ class SlowSight {
     }
 
     Sight of(const SurfaceCell& cell) const {
-        const Eigen::Vector3d p =
-            camera_T_world_ * Eigen::Vector3d(cell.openPosition.cast<double>());
-        const double least = 1.02 * sensor_.nearLimit;
-        const StereoCamera& c = sensor_.camera;
-        const Eigen::Vector2d uv = c.project(p);
-        const double inside = std::min(
-            {p.z() - least, sensor_.farLimit - p.z(), uv.x() - sensor_.firstColumn - kMargin,
-             c.width - 1 - kMargin - uv.x(), uv.y() - kMargin, c.height - 1 - kMargin - uv.y()});
+        const Eigen::Vector3d p = inCamera(cell.openPosition);
+        const double inside = insideBy(p);
         if (inside < -kDoubt || p.z() <= 0) {
             return Sight::kNo;
         }
+        const Eigen::Vector2d uv = sensor_.camera.project(p);
         const double column = uv.x() / kPixels;
         const double row = uv.y() / kPixels;
         bool doubt = inside < kDoubt || nearWhole(column) || nearWhole(row);
@@ -104,7 +102,29 @@ class SlowSight {
         return doubt ? Sight::kRounding : Sight::kYes;
     }
 
+    /// Whether a place is in the image and within the range, whatever stands before it.
+    Sight inImage(const Eigen::Vector3f& place) const {
+        const double inside = insideBy(inCamera(place));
+        return inside < -kDoubt ? Sight::kNo : inside > kDoubt ? Sight::kYes : Sight::kRounding;
+    }
+
  private:
+    Eigen::Vector3d inCamera(const Eigen::Vector3f& place) const {
+        return camera_T_world_ * Eigen::Vector3d(place.cast<double>());
+    }
+
+    /// How far a place is from the borders of what the camera sees, [m] or [px]; negative outside.
+    double insideBy(const Eigen::Vector3d& p) const {
+        const double least = 1.02 * sensor_.nearLimit;
+        const StereoCamera& c = sensor_.camera;
+        const Eigen::Vector2d uv = c.project(p);
+        return p.z() <= 0 ? p.z() - least
+                          : std::min({p.z() - least, sensor_.farLimit - p.z(),
+                                      uv.x() - sensor_.firstColumn - kMargin,
+                                      c.width - 1 - kMargin - uv.x(), uv.y() - kMargin,
+                                      c.height - 1 - kMargin - uv.y()});
+    }
+
     static constexpr double kPixels = 12;   // of the image to one of the scorer's
     static constexpr double kMargin = 6;    // [px] at the border nothing is seen
     static constexpr double kDoubt = 2e-3;  // [px], [m]
@@ -238,6 +258,44 @@ TEST_P(ScorerTwin, anEstimateIsTheSumOfASample) {
         const double deviation = std::sqrt(static_cast<double>(stride - 1) * squares);
         EXPECT_NEAR(estimate.openGain, score.openGain, 4 * deviation + 1e-9);
     }
+}
+
+TEST_P(ScorerTwin, seesIntoTheGapsWhoseLinesAreOpen) {
+    SCOPED_TRACE("seed " + std::to_string(GetParam()));
+    Watched watched(GetParam(), 0.08, 0.02, true);
+    ViewScorer::Weights weights;
+    weights.gapsByLine = true;
+    const ViewScorer scorer = watched.scorer(weights);
+    std::size_t open = 0;
+    std::size_t closed = 0;
+    for (int i = 0; i < 20; ++i) {
+        const Pose pose = watched.anyPose();
+        const SlowSight slow(watched, pose);
+        const auto shareIn = [](const std::vector<riftmap::Sight>& sights, std::size_t item) {
+            const auto it = std::find_if(sights.begin(), sights.end(),
+                                         [&](const auto& s) { return s.item == item; });
+            return it == sights.end() ? 0.0F : it->share;
+        };
+        const ViewScorer::Seen seen = scorer.sights(pose);
+        const ViewScorer::Seen most = scorer.sightsAtMost(pose);
+        EXPECT_TRUE(seen.gaps.empty());
+        for (std::size_t k = 0; k < scorer.open().size(); ++k) {
+            const SurfaceCell& cell = scorer.open()[k]->cell;
+            const Sight sight = slow.inImage(cell.hiddenPosition);
+            if (cell.hidden <= 0 || sight == Sight::kRounding) {
+                continue;
+            }
+            const double torn = scorer.benefit(*scorer.open()[k], pose).torn;
+            const bool in = sight == Sight::kYes && torn > 0.02;
+            EXPECT_FLOAT_EQ(shareIn(seen.sights, 2 * k), in ? static_cast<float>(torn) : 0.0F);
+            const float atMost = shareIn(most.sights, 2 * k);
+            EXPECT_GE(atMost, shareIn(seen.sights, 2 * k));
+            open += in ? 1 : 0;
+            closed += !in && atMost > 0 ? 1 : 0;
+        }
+    }
+    EXPECT_GT(open, 20U);
+    EXPECT_GT(closed, 20U);
 }
 
 INSTANTIATE_TEST_SUITE_P(Seeds, ScorerTwin, testing::Range(1U, 6U));

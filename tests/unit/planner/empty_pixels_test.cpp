@@ -151,5 +151,44 @@ TEST(EmptyPixels, areNoneWhereTheBackgroundMayHideSurface) {
                             [](float depth) { return depth == 0.0F; }));
 }
 
+TEST(EmptyPixels, ofExactDepthAreProvenWhereNothingCanBeTooNear) {
+    std::array<std::size_t, 2> count{};
+    for (unsigned seed = 1; seed <= 12; ++seed) {
+        SCOPED_TRACE("seed " + std::to_string(seed));
+        std::mt19937 random(seed);
+        std::uniform_real_distribution<double> in(-1, 1);
+        const View view = Spheres(random).view();
+        // What may hold surface begins somewhere in the space before the near limit.
+        const Eigen::Vector3d low(0.3 * in(random), 0.3 * in(random), 0.4 + 0.3 * in(random));
+        const Eigen::AlignedBox3d surfaces(low, low + Eigen::Vector3d::Ones());
+        const Eigen::Vector3d half(2, 2, seed % 3 == 0 ? 0.3 : 2);  // or the grid ends there
+        FreeSpace space(Eigen::AlignedBox3d(-half, half), 0.07);
+        space.declareFreeOutside(surfaces);
+        SensorModel sensor = sensorOf(view, true);
+        sensor.nearLimit = 0.53;
+        sensor.clearance = 0.1;
+        const EmptyPixels empty = space.emptyPixels(view, sensor, false);
+        const auto proven = [&](const Eigen::Vector3d& place) {
+            const double off = surfaces.exteriorDistance(space.snap(place));
+            return Eigen::AlignedBox3d(-half, half).contains(place) && off > 0.5 * 0.07;
+        };
+        for (int row = 0; row < view.camera.height; ++row) {
+            for (int column = 0; column < view.camera.width; ++column) {
+                const std::size_t i = view.disparity.index(column, row);
+                const Eigen::Vector3d ray = view.camera.backProject(column, row, 1).normalized();
+                const double end = 0.53 / ray.z();
+                bool slow = !view.disparity.valid(column, row);
+                for (double s = 0.1; slow && s < end + 0.25 * 0.07; s += 0.25 * 0.07) {
+                    slow = proven(std::min(s, end) * ray);
+                }
+                ASSERT_EQ(empty.proven[i] != 0, slow) << column << " " << row;
+                ++count[slow ? 1 : 0];
+            }
+        }
+    }
+    EXPECT_GT(count[0], 10000U);
+    EXPECT_GT(count[1], 10000U);
+}
+
 }  // namespace
 }  // namespace riftmap

@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <atomic>
 #include <numeric>
 #include <random>
 
@@ -189,6 +190,57 @@ TEST(ViewTour, EmptyWhereNothingIsWorthAView) {
     options.minGain = 1e3;
     EXPECT_TRUE(planTour(scene.views, scene.worth, scene.between(), options).views.empty());
     EXPECT_TRUE(planTour({}, scene.worth, scene.between(), options).views.empty());
+}
+
+/// What settling leaves of a view's sights: two of three.
+void settleAny(std::size_t index, TourView& view) {
+    std::erase_if(view.sights, [&](const Sight& s) { return (s.item * 7 + index) % 3 == 0; });
+}
+
+TEST(ViewTour, OfViewsSettledOnTheWayIsThatOfViewsSettledBefore) {
+    std::size_t settled = 0;
+    std::size_t all = 0;
+    for (unsigned seed = 200; seed < 230; ++seed) {
+        SCOPED_TRACE("seed " + std::to_string(seed));
+        const Scene scene(seed, 80);
+        TourOptions options;
+        options.maxViews = 3;
+        std::vector<TourView> before = scene.views;
+        for (std::size_t v = 0; v < before.size(); ++v) {
+            settleAny(v, before[v]);
+        }
+        std::vector<std::atomic<int>> asked(before.size());
+        const ViewTour lazy = planTour(scene.views, scene.worth, scene.between(), options,
+                                       [&](std::size_t v, TourView& view) {
+                                           ++asked[v];
+                                           settleAny(v, view);
+                                       });
+        const ViewTour eager = planTour(before, scene.worth, scene.between(), options);
+        EXPECT_EQ(lazy.views, eager.views);
+        EXPECT_EQ(lazy.gains, eager.gains);
+        for (const auto& times : asked) {
+            EXPECT_LE(times, 1);
+            settled += static_cast<std::size_t>(times);
+        }
+        all += asked.size();
+    }
+    EXPECT_LT(settled, all);
+}
+
+TEST(ViewTour, SettlesNoMoreViewsThanItMay) {
+    const Scene scene(300, 80);
+    TourOptions options;
+    options.maxViews = 10;
+    options.maxSettled = 13;
+    std::atomic<int> asked = 0;
+    const ViewTour tour = planTour(scene.views, scene.worth, scene.between(), options,
+                                   [&](std::size_t v, TourView& view) {
+                                       ++asked;
+                                       settleAny(v, view);
+                                   });
+    EXPECT_EQ(asked, 13);
+    EXPECT_FALSE(tour.views.empty());
+    EXPECT_LE(tour.views.size(), 13U);
 }
 
 }  // namespace

@@ -164,6 +164,8 @@ class FreeSpace {
     /// Of pixels without a match: true if nothing lies nearer than the near limit, by `sensor`'s
     /// clearance and by what was proven before.
     bool nothingTooNear(const View& view, const SensorModel& sensor, int column, int row) const;
+    bool nothingTooNear(const View& view, const SensorModel& sensor, const Eigen::Vector2i& first,
+                        const Eigen::Vector2i& last) const;
     void searchFrom(const Eigen::Vector3i& start, const Fits& fits);
     bool fitsAt(std::size_t voxel, const Fits& fits);
 

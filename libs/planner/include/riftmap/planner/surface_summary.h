@@ -52,6 +52,8 @@ class SurfaceSummary {
     /// `cell`: edge of a cell [m]; `resolution`: how finely and accurately the surface is asked to
     /// be known [m]; both > 0.
     SurfaceSummary(double cell, double resolution);
+    SurfaceSummary(const SurfaceSummary&) = delete;  // its grid points into it
+    SurfaceSummary& operator=(const SurfaceSummary&) = delete;
 
     /// Cells with fewer vertices may be noise: they hide nothing and stand in no way.
     static constexpr std::uint32_t kLeastVertices = 3;
@@ -110,10 +112,25 @@ class SurfaceSummary {
     Block build(const PixelGraph& graph, std::uint64_t blockKey, const SeenThrough* seen) const;
     std::vector<std::uint64_t> blocksSeen(const View& view) const;
     std::size_t newParts(const Block& now) const;
-    static std::size_t indexInBlock(const Eigen::Vector3i& cell);
+    void spreadBlocks();
+    const Block* blockAt(const Eigen::Vector3i& at) const;
 
     double cell_, resolution_;
     std::map<std::uint64_t, Block> blocks_;
+    /// blocks_ by where they are; empty if that would take too much.
+    struct Grid {
+        Eigen::Vector3i low = Eigen::Vector3i::Zero(), size = Eigen::Vector3i::Zero();
+        std::vector<const Block*> blocks;
+
+        bool holds(const Eigen::Vector3i& in) const {
+            return (in.array() >= 0).all() && (in.array() < size.array()).all();
+        }
+        std::size_t index(const Eigen::Vector3i& in) const {
+            const std::ptrdiff_t row = std::ptrdiff_t{in.z()} * size.y() + in.y();
+            return static_cast<std::size_t>(row * size.x() + in.x());
+        }
+    };
+    Grid grid_;
     Eigen::AlignedBox3f box_;  ///< around all blocks there ever were
     std::vector<std::uint64_t> changed_;
     std::vector<Block> former_;

@@ -21,9 +21,10 @@ struct TourView {
 };
 
 struct TourOptions {
-    double viewCost = 1.0;      ///< of a view, as length of path [m], > 0
-    double minGain = 0.0;       ///< a view that adds no more than this is left out
-    std::size_t maxViews = 10;  ///< stops at most; the order is exact: 2^n n^2 steps, n <= 16
+    double viewCost = 1.0;         ///< of a view, as length of path [m], > 0
+    double minGain = 0.0;          ///< a view that adds no more than this is left out
+    std::size_t maxViews = 10;     ///< stops at most; the order is exact: 2^n n^2 steps, n <= 16
+    std::size_t maxSettled = 150;  ///< views asked about, see planTour(); the others are left out
     /// Cost of a metre (or a view) once nothing is left to see, >= 0; while there is, the share
     /// R(k) of tourCost() is added. 0 = early gain alone counts, large = the length alone.
     double tail = 0.2;
@@ -58,6 +59,10 @@ class SeenItems {
 /// Length of the way between two candidates [m].
 using WayLength = std::function<double(std::size_t, std::size_t)>;
 
+/// Takes out of a candidate's sights, given with its index, what it does not show after all. It is
+/// called once at most for each, for several candidates at a time from several threads.
+using SightsSettle = std::function<void(std::size_t, TourView&)>;
+
 /// Cost of taking these views in this order: every stretch of path and every view is paid in
 /// proportion to what was still to be seen before it, plus `tail`. With R(k) = the gain that is
 /// missing before stop k over (the tour's whole gain + settled), and l(k) the way to it,
@@ -68,8 +73,12 @@ double tourCost(const std::vector<TourView>& views, const std::vector<float>& wo
 
 /// Picks views that complement each other, each the best gain for its cost given those picked
 /// before it (cost: view and detour), until none adds more than `minGain`; then orders them with
-/// least tourCost(), exactly. Deterministic; time grows with views * items * maxViews.
-ViewTour planTour(const std::vector<TourView>& views, const std::vector<float>& worth,
-                  const WayLength& between, const TourOptions& options);
+/// least tourCost(), exactly. With `settle` the sights are what a view may show at most, and those
+/// that may be picked are settled before, best first, up to `maxSettled`: but for that limit the
+/// tour is the one that settling all of them beforehand leads to. Deterministic; time grows with
+/// views * items * maxViews.
+ViewTour planTour(std::vector<TourView> views, const std::vector<float>& worth,
+                  const WayLength& between, const TourOptions& options,
+                  const SightsSettle& settle = {});
 
 }  // namespace riftmap
