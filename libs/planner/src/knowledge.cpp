@@ -82,6 +82,29 @@ FreeSpace hullOf(const Eigen::AlignedBox3d& surfaces, double cell) {
     return hull;
 }
 
+/// Whether a view has matches where it sees this place: one pixel in ten around it.
+bool matchesAt(const View& view, const Eigen::Vector3d& place) {
+    constexpr int kReach = 6;  // [px]
+    const Eigen::Vector3d p = view.world_T_camera.inverse() * place;
+    if (p.z() <= 0) {
+        return false;
+    }
+    const DisparityImage& d = view.disparity;
+    const Eigen::Array2d uv = view.camera.project(p).array().round();
+    const Eigen::Array2i first = (uv - kReach).max(0.0).cast<int>();
+    const Eigen::Array2i end =
+        (uv + kReach + 1).min(Eigen::Array2d(d.width, d.height)).max(0.0).cast<int>();
+    int all = 0;
+    int matched = 0;
+    for (int row = first.y(); row < end.y(); ++row) {
+        for (int column = first.x(); column < end.x(); ++column) {
+            ++all;
+            matched += d.valid(column, row) ? 1 : 0;
+        }
+    }
+    return all > 0 && 10 * matched >= all;
+}
+
 }  // namespace
 
 void PlannerOptions::describe(OptionTable& table) {
@@ -92,11 +115,11 @@ void PlannerOptions::describe(OptionTable& table) {
     table.add("voxel_size", voxelSize, 0, 10, "m",
               "Edge of the voxels of the known free space; 0 = by the size of the workspace");
     table.add("view_cost", viewCost, 0.01, 100, "m", "Cost of taking a view, as length of path");
-    table.add(
-        "min_gain", minGain, 0, 1, "",
-        "A view that promises less than this share of the surface known is not worth taking; "
-        "0 = 0.0007, with exact depth 0.0001; around an object (surface_box) 0.0003, with exact "
-        "depth 0.0004, with noisy depth that is not matched 0.00055");
+    table.add("min_gain", minGain, 0, 1, "",
+              "A view that promises less than this share of the surface known is not worth taking; "
+              "0 = 0.0005, with exact depth 0.0001, with noisy depth that is not matched 0.0007; "
+              "around an "
+              "object (surface_box) 0.0003, 0.0004 and 0.00055");
     table.add("max_attempts", maxAttempts, 1, 100, "",
               "Different views of a tear that may fail before it is given up");
     table.add("unknown_weight", unknownWeight, 0, 100, "",
@@ -158,6 +181,13 @@ void Knowledge::update(const View& view) {
     if (hull_) {
         hull_->carve(view, sensor_, empty);
         updateSurface(*hull_);
+    }
+}
+
+void Knowledge::noteLooks(const View& view, const std::vector<Eigen::Vector3d>& places) {
+    for (const Eigen::Vector3d& place : places) {
+        unseen().noteTry(place);
+        unseen().noteLook(place, matchesAt(view, place));
     }
 }
 
@@ -266,7 +296,7 @@ double Knowledge::minGain() const {
     struct Shares {
         double inRooms, aroundObject;
     };
-    constexpr Shares kExact{1e-4, 4e-4}, kPixelwise{7e-4, 5.5e-4}, kMatched{7e-4, 3e-4};
+    constexpr Shares kExact{1e-4, 4e-4}, kPixelwise{7e-4, 5.5e-4}, kMatched{5e-4, 3e-4};
     const Shares& shares = sensor_.exactDepth() ? kExact
                            : sensor_.matched()  ? kMatched
                                                 : kPixelwise;

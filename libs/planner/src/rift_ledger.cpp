@@ -107,11 +107,19 @@ void RiftLedger::judge(const SurfaceSummary& summary, const std::vector<std::uin
     constexpr float kHelped = 0.75F;
     for (std::size_t i = 0; i < keys.size(); ++i) {
         const auto it = records_.find(keys[i]);
-        if (it == records_.end() || it->second.state != RiftState::kOpen) {
+        if (it == records_.end()) {
             continue;
         }
         RiftRecord& r = it->second;
-        if (tear(r.cell, summary.cellSize()) <= kHelped * before[i]) {
+        const bool helped =
+            r.state != RiftState::kOpen || tear(r.cell, summary.cellSize()) <= kHelped * before[i];
+        if ((r.cell.kinds & kNoMatch) != 0) {
+            for (Tries* t : {&unmatched_, &unmatchedByBlock_[SurfaceSummary::blockOf(keys[i])]}) {
+                ++t->all;
+                t->helped += helped ? 1 : 0;
+            }
+        }
+        if (helped) {
             continue;
         }
         const Eigen::Vector3f ray = eye.cast<float>() - r.cell.openPosition;
@@ -120,6 +128,22 @@ void RiftLedger::judge(const SurfaceSummary& summary, const std::vector<std::uin
             giveUp(keys[i], RiftState::kBelowResolution, vainReason(r));
         }
     }
+}
+
+double RiftLedger::tryWorth(const RiftRecord& record) const {
+    constexpr double kUsual = 0.5;
+    constexpr double kBefore = 100;  // tries taken to be as usual
+    constexpr double kBeforeInBlock = 10;
+    if ((record.cell.kinds & kNoMatch) == 0) {
+        return 1;
+    }
+    double share = (unmatched_.helped + kBefore * kUsual) / (unmatched_.all + kBefore);
+    const auto it = unmatchedByBlock_.find(SurfaceSummary::blockOf(record.cell.key));
+    if (it != unmatchedByBlock_.end()) {
+        const Tries& here = it->second;
+        share = (here.helped + kBeforeInBlock * share) / (here.all + kBeforeInBlock);
+    }
+    return std::min(1.0, share / kUsual);
 }
 
 void RiftLedger::giveUp(std::uint64_t key, RiftState state, const std::string& reason) {

@@ -28,6 +28,8 @@ ViewScorer::Weights weightsFor(const Knowledge& k, const ObjectMemory& memory) {
         weights.doubt = memory.doubt.share();
         weights.vain = weights.vainUnmatched = 0.4;
         weights.gapsByLine = true;
+    } else {
+        weights.byExperience = k.sensor().matched();
     }
     return weights;
 }
@@ -398,9 +400,11 @@ void Choice::giveUp(const RiftRecord& record, bool reachable, bool visible) {
     }
 }
 
-/// No candidate was worth it. Every tear that is left gets candidates of its own, from all sides;
-/// one that even these do not help is given up, with the reason.
+/// No candidate was worth it. Tears that are left get candidates of their own, from all sides; one
+/// that even these do not help is given up, with the reason. Where thousands are left that no view
+/// closes (plain walls) the largest speak for the others.
 std::optional<ViewPlan> Choice::lastResorts() {
+    constexpr std::size_t kMost = 2000;  // 5 ms each, more where many are open
     std::vector<const RiftRecord*> left = scorer_.open();
     const double cell = k_.summary().cellSize();
     std::stable_sort(left.begin(), left.end(), [&](const RiftRecord* a, const RiftRecord* b) {
@@ -410,12 +414,19 @@ std::optional<ViewPlan> Choice::lastResorts() {
     // Views that show a tear, were weighed, and are not worth it, made for it or for others.
     constexpr std::size_t kViews = 12;
     std::unordered_map<std::uint64_t, std::size_t> shown;
+    std::size_t count = 0;
     for (const RiftRecord* record : left) {
         if (record->state != RiftState::kOpen) {
             continue;
         }
         if (shown[record->cell.key] >= kViews) {
             giveUp(*record, true, true);
+            continue;
+        }
+        if (++count > kMost) {
+            k_.ledger().giveUp(record->cell.key, RiftState::kDeferred,
+                               "not looked at by itself: no view of " + std::to_string(kMost) +
+                                   " larger ones was worth taking");
             continue;
         }
         candidates_.clear();
@@ -434,15 +445,14 @@ std::optional<ViewPlan> Choice::lastResorts() {
             reachable = !candidates_.empty() || inRange(p);
         }
         const bool visible = !candidates_.empty();
-        std::erase_if(candidates_, [&](const Candidate& c) {
-            return scorer_.benefit(*record, c.pose).area <= 0;
-        });
+        for (Candidate& c : candidates_) {
+            c.utility = scorer_.benefit(*record, c.pose).area;  // until it is scored
+        }
+        std::erase_if(candidates_, [](const Candidate& c) { return c.utility <= 0; });
         if (candidates_.size() > kViews) {
-            std::stable_sort(candidates_.begin(), candidates_.end(),
-                             [&](const Candidate& a, const Candidate& b) {
-                                 return scorer_.benefit(*record, a.pose).area >
-                                        scorer_.benefit(*record, b.pose).area;
-                             });
+            std::stable_sort(
+                candidates_.begin(), candidates_.end(),
+                [](const Candidate& a, const Candidate& b) { return a.utility > b.utility; });
             candidates_.resize(kViews);
         }
         scoreFrom(0);

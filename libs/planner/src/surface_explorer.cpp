@@ -95,9 +95,7 @@ void SurfaceExplorer::look(const std::optional<ViewPlan>& plan, double planMs) {
     if (plan) {
         knowledge_.ledger().judge(knowledge_.summary(), plan->cells, before,
                                   view.world_T_camera.translation);
-        for (const Eigen::Vector3d& place : unknown) {
-            knowledge_.unseen().noteTry(place);
-        }
+        knowledge_.noteLooks(view, unknown);
         step.gain = plan->gain;
         step.coarseGain = plan->coarseGain;
         step.unknownGain = plan->unknownGain;

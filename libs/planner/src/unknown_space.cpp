@@ -32,6 +32,40 @@ FreeSpace::UnknownRun FreeSpace::firstUnknown(const Eigen::Vector3d& origin,
     return run;
 }
 
+std::size_t FreeSpace::regionOf(const Eigen::Vector3i& v) const {
+    const Eigen::Vector3i r = v / kRegion;
+    const Eigen::Vector3i count = (size_ + Eigen::Vector3i::Constant(kRegion - 1)) / kRegion;
+    return (static_cast<std::size_t>(r.z()) * static_cast<std::size_t>(count.y()) +
+            static_cast<std::size_t>(r.y())) *
+               static_cast<std::size_t>(count.x()) +
+           static_cast<std::size_t>(r.x());
+}
+
+void FreeSpace::noteLook(const Eigen::Vector3d& place, bool matched) {
+    const Eigen::Vector3i v = voxelOf(place);
+    if (!inside(v)) {
+        return;
+    }
+    if (looks_.empty()) {
+        looks_.resize(regionOf(size_ - Eigen::Vector3i::Ones()) + 1);
+    }
+    Looks& looks = looks_[regionOf(v)];
+    ++looks.all;
+    looks.matched += matched ? 1 : 0;
+}
+
+double FreeSpace::lookWorth(const Eigen::Vector3d& place) const {
+    constexpr double kUsual =
+        0.6;                       // share of matches: near edges and at flat angles there are none
+    constexpr double kBefore = 8;  // looks taken to have matched, so that a few tell little
+    const Eigen::Vector3i v = voxelOf(place);
+    if (looks_.empty() || !inside(v)) {
+        return 1;
+    }
+    const Looks& looks = looks_[regionOf(v)];
+    return std::min(1.0, (looks.matched + kBefore) / (looks.all + kBefore) / kUsual);
+}
+
 std::vector<Eigen::Vector3d> FreeSpace::toBeLookedAt(const Eigen::Vector3d& from,
                                                      const Eigen::Vector3d& to,
                                                      double radius) const {

@@ -57,6 +57,7 @@ ViewScorer::ViewScorer(const SensorModel& sensor, const SurfaceSummary& summary,
     : sensor_(sensor),
       summary_(&summary),
       space_(&space),
+      ledger_(&ledger),
       weights_(weights),
       resolution_(resolution),
       goodDepth_(sensor.goodDepth(resolution)) {
@@ -93,7 +94,9 @@ void ViewScorer::groupBlocks() {
 
 double ViewScorer::leftAfterTries(const RiftRecord& record) const {
     const bool unmatched = (record.cell.kinds & kNoMatch) != 0;
-    return std::pow(unmatched ? weights_.vainUnmatched : weights_.vain, record.attempts.size());
+    const double worth = weights_.byExperience ? ledger_->tryWorth(record) : 1.0;
+    return worth *
+           std::pow(unmatched ? weights_.vainUnmatched : weights_.vain, record.attempts.size());
 }
 
 /// What surface that is new is worth if it is seen from so far. One view is not accurate enough
@@ -333,8 +336,9 @@ ViewScore ViewScorer::scoreEvery(std::size_t stride, int rayStride,
         result.badlySeen.clear();
     }
     const double side = static_cast<double>(kPixels * rayStride) / camera.fx;
-    forEachUnknown(world_T_camera, buffer, rayStride, [&](const Eigen::Vector3d&, double depth) {
-        result.unknownGain += side * side * depth * depth * newSurfaceShare(depth);
+    forEachUnknown(world_T_camera, buffer, rayStride, [&](const Eigen::Vector3d& p, double depth) {
+        result.unknownGain += side * side * depth * depth * newSurfaceShare(depth) *
+                              (weights_.byExperience ? space_->lookWorth(p) : 1.0);
     });
     result.unknownGain *= weights_.unknown;
     result.gain = result.openGain + result.unknownGain;

@@ -60,8 +60,7 @@ std::vector<World> worlds() {
         {"rooms", "explore-indoor.ini", {}, {"N0"}, false, 4},
         {"small_house",
          "explore-indoor.ini",
-         {"World.mesh=" + data + "/world_aws_small_house/aws_small_house.obj",
-          "Planner.background_is_free=true"},  // it has no ceiling
+         {"World.mesh=" + data + "/world_aws_small_house/aws_small_house.obj"},
          {"N0"},
          false,
          6},

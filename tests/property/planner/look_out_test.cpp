@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "planner_scene.h"
 #include "random_scene.h"
 #include "view_choice.h"
 
@@ -25,6 +26,7 @@ struct ChoiceTwin {
         choice.addAllInSight(record, most);
         return choice.candidates_;
     }
+    static std::optional<ViewPlan> lastResorts(Choice& choice) { return choice.lastResorts(); }
 };
 
 namespace {
@@ -212,6 +214,46 @@ TEST_P(LookOutTwin, looksToAllSidesBeforeItSaysHidden) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Seeds, LookOutTwin, testing::Range(1U, 6U));
+
+TEST(LastResorts, leaveTheSmallestOfThousandsToTheOthersReason) {
+    GraphOptions fine;
+    fine.targetResolution = 0.005;  // the wall is sampled far more sparsely: all of it is open
+    PixelGraph graph(fine);
+    PlatformLimits limits;
+    limits.boxMin = Eigen::Vector3d(-1, -2, -2);
+    limits.boxMax = Eigen::Vector3d(3, 2, 2);
+    limits.farLimit = 2.6;
+    PlannerOptions options;
+    options.minGain = 1;  // no view is worth it
+    options.voxelSize = 0.1;
+    Knowledge knowledge(graph, limits, options);
+    const View view = test::viewOf(lookAt({0, 0, 0}, {1, 0, 0}), test::wall(2.0));
+    graph.merge(view);
+    knowledge.update(view);
+    knowledge.updateReach();
+    const auto open = knowledge.ledger().counts()[static_cast<std::size_t>(RiftState::kOpen)];
+    ASSERT_GT(open, 4000U);
+    std::vector<Pose> pool;
+    ObjectMemory memory;
+    Choice choice(knowledge, pool, memory);
+    EXPECT_FALSE(ChoiceTwin::lastResorts(choice));
+    std::size_t notLookedAt = 0;
+    float smallest = 1e9F;
+    float largest = 0;
+    for (const auto& [key, record] : knowledge.ledger().records()) {
+        EXPECT_NE(record.state, RiftState::kOpen);
+        const float size = knowledge.ledger().tear(record.cell, knowledge.summary().cellSize());
+        if (record.reason.rfind("not looked at by itself", 0) == 0) {
+            EXPECT_EQ(record.state, RiftState::kDeferred);
+            largest = std::max(largest, size);
+            ++notLookedAt;
+        } else if (record.reason != "shorter than the asked resolution") {
+            smallest = std::min(smallest, size);
+        }
+    }
+    EXPECT_EQ(notLookedAt, open - 2000);
+    EXPECT_LE(largest, smallest);
+}
 
 }  // namespace
 }  // namespace riftmap

@@ -249,6 +249,30 @@ TEST(FreeSpace, theUnknownIsSeenThroughFreeSpaceOnly) {
     EXPECT_LT(space.firstUnknown(eye, Eigen::Vector3d::UnitX(), s + 0.05).begin, 0);
 }
 
+TEST(FreeSpace, looksWithoutAMatchMakeThoseAroundThemWorthLess) {
+    FreeSpace space(kBox, 0.1);
+    const Eigen::Vector3d place = space.snap({1, 0, 0});
+    const Eigen::Vector3d far = place + Eigen::Vector3d(0.8, 0, 0);
+    EXPECT_EQ(space.lookWorth(place), 1.0);
+    double last = 1;
+    for (int i = 0; i < 30; ++i) {
+        space.noteLook(place, false);
+        EXPECT_LE(space.lookWorth(place), last);
+        last = space.lookWorth(place);
+    }
+    EXPECT_LT(last, 0.4);
+    EXPECT_GT(last, 0);
+    EXPECT_EQ(space.lookWorth(far), 1.0);
+    for (int i = 0; i < 200; ++i) {
+        space.noteLook(place, i % 5 < 4);
+        space.noteLook(far, i % 5 < 3);  // as many as is usual
+    }
+    EXPECT_EQ(space.lookWorth(place), 1.0);
+    EXPECT_EQ(space.lookWorth(far), 1.0);
+    space.noteLook({99, 0, 0}, false);
+    EXPECT_EQ(space.lookWorth({99, 0, 0}), 1.0);
+}
+
 TEST(SensorModel, putsTheTargetIntoTheMiddleOfTheTrueFieldOfView) {
     const View view = test::viewOf(lookAt({0, 0, 0}, {1, 0, 0}), test::wall(3.0), 60);
     const SensorModel sensor = sensorOf(view);

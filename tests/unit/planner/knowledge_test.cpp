@@ -117,7 +117,7 @@ TEST_F(Slit, isNotLookedForWhileItCouldLeadNowhere) {
 
 TEST_F(Slit, theLeastGainFollowsTheDepthUnlessItIsGiven) {
     see(0.5);
-    EXPECT_NEAR(knowledge.minGain(), 7e-4 * knowledge.summary().area(), 1e-12);
+    EXPECT_NEAR(knowledge.minGain(), 5e-4 * knowledge.summary().area(), 1e-12);
     PlatformLimits exact = limits();
     exact.depthKind = DepthKind::kExact;
     PlatformLimits pixelwise = limits();
@@ -128,8 +128,8 @@ TEST_F(Slit, theLeastGainFollowsTheDepthUnlessItIsGiven) {
     object.surfaceBox = {1, -1, -1, 2, 1, 1};
     for (const auto& [l, o, share] :
          {std::tuple(exact, options(), 1e-4), std::tuple(exact, given, 0.01),
-          std::tuple(exact, object, 4e-4), std::tuple(limits(), object, 3e-4),
-          std::tuple(pixelwise, object, 5.5e-4)}) {
+          std::tuple(pixelwise, options(), 7e-4), std::tuple(exact, object, 4e-4),
+          std::tuple(limits(), object, 3e-4), std::tuple(pixelwise, object, 5.5e-4)}) {
         Knowledge other(graph, l, o);
         other.update(test::viewOf(lookAt({0, 0, 0}, {1, 0, 0}), test::wall(1.2)));
         EXPECT_NEAR(other.minGain(), share * other.summary().area(), 1e-12);
@@ -142,6 +142,34 @@ TEST_F(Slit, theCameraMayBeWhereNoWayLeads) {
     EXPECT_FALSE(std::isfinite(knowledge.space().distanceTo({1.6, 0, 0})));
     EXPECT_FALSE(knowledge.mayBeAt({1.6, 0, 0.1}));  // too near to its side
     EXPECT_FALSE(knowledge.mayBeAt({5, 0, 0}));      // out of its box
+}
+
+TEST_F(Slit, looksKnowWhetherTheViewHadAMatchThere) {
+    View view = test::viewOf(lookAt({0, 0, 0}, {1, 0, 0}), test::wall(2.0));
+    for (int row = 0; row < view.camera.height; ++row) {  // the right half is plain
+        for (int column = view.camera.width / 2; column < view.camera.width; ++column) {
+            view.disparity.disparity[view.disparity.index(column, row)] = kNoDisparity;
+        }
+    }
+    graph.merge(view);
+    knowledge.update(view);
+    const Eigen::Vector3d plain(1.5, -0.4, 0);
+    const Eigen::Vector3d textured(1.5, 0.4, 0);
+    const Eigen::Vector3d behindTheCamera(-1.5, 0, 0);
+    const Eigen::Vector3d besideImage(1.5, 1.9, 0);
+    for (int i = 0; i < 40; ++i) {
+        knowledge.noteLooks(view, {plain, textured, behindTheCamera, besideImage});
+    }
+    EXPECT_LT(knowledge.unseen().lookWorth(plain), 0.3);
+    EXPECT_EQ(knowledge.unseen().lookWorth(textured), 1.0);
+    EXPECT_LT(knowledge.unseen().lookWorth(behindTheCamera), 0.3);
+    EXPECT_LT(knowledge.unseen().lookWorth(besideImage), 0.3);
+    // Each look is a try, too: what is unknown still after two is not looked at any more.
+    const auto along = [&](const Eigen::Vector3d& p) {
+        return knowledge.space().firstUnknown({0, 0, 0}, p.normalized(), 1.8).begin;
+    };
+    EXPECT_LT(along(textured), 0);  // free
+    EXPECT_GT(along({1.5, -0.6, 0}), 0);
 }
 
 }  // namespace

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "planner_scene.h"
 #include "riftmap/planner/view_scorer.h"
 
@@ -124,6 +126,56 @@ TEST_F(LedgerOnWall, aTryThatHelpedIsNoAttempt) {
     const float tear = ledger.tear(ledger.records().at(key).cell, summary.cellSize());
     ledger.judge(summary, {key}, {4 * tear}, {0, 0, 0});
     EXPECT_TRUE(ledger.records().at(key).attempts.empty());
+}
+
+TEST_F(LedgerOnWall, triesInVainMakeOtherTearsWithoutAMatchWorthLess) {
+    View view = test::viewOf(lookAt({0, 0, 0}, {1, 0, 0}), test::wall(2.0));
+    for (int row = 0; row < view.camera.height; ++row) {  // a grid of plain squares on the wall
+        for (int column = 0; column < view.camera.width; ++column) {
+            if (column % 40 < 20 && row % 40 < 20) {
+                view.disparity.disparity[view.disparity.index(column, row)] = kNoDisparity;
+            }
+        }
+    }
+    PixelGraph map(options());
+    SurfaceSummary cells(0.1, 0.05);
+    RiftLedger tears(0.05, 100);
+    map.merge(view);
+    cells.update(map, view);
+    tears.update(cells);
+    std::vector<std::uint64_t> unmatched;
+    std::uint64_t border = 0;
+    for (const auto& [key, record] : tears.records()) {
+        EXPECT_EQ(tears.tryWorth(record), 1.0);
+        if (record.state == RiftState::kOpen && (record.cell.kinds & kNoMatch) != 0) {
+            unmatched.push_back(key);
+        } else if (record.state == RiftState::kOpen) {
+            border = key;
+        }
+    }
+    ASSERT_GT(unmatched.size(), 40U);
+    const auto near = [&](std::uint64_t key) {  // of the first one's block
+        return SurfaceSummary::blockOf(key) == SurfaceSummary::blockOf(unmatched.front());
+    };
+    const auto worth = [&](std::uint64_t key) { return tears.tryWorth(tears.records().at(key)); };
+    const std::uint64_t other = *std::find_if(unmatched.begin(), unmatched.end(),
+                                              [&](std::uint64_t key) { return !near(key); });
+    const auto judge = [&](std::uint64_t key, float before) {
+        tears.judge(cells, {key}, {before}, {0, 0, 0});
+    };
+    for (int i = 0; i < 20; ++i) {
+        judge(unmatched.front(), 0);
+    }
+    EXPECT_LT(worth(unmatched.front()), 0.5);
+    EXPECT_LT(worth(other), 1.0);  // a little
+    EXPECT_GT(worth(other), 0.8);
+    ASSERT_NE(border, 0U);
+    EXPECT_EQ(worth(border), 1.0);
+    for (int i = 0; i < 200; ++i) {
+        judge(unmatched.front(), 1e9F);
+    }
+    EXPECT_EQ(worth(unmatched.front()), 1.0);
+    EXPECT_EQ(worth(other), 1.0);
 }
 
 TEST_F(LedgerOnWall, whatWasUnreachableOpensAgainAndNothingElse) {

@@ -83,6 +83,13 @@ class FreeSpace {
     /// are unknown still after `kTries` views do not count as unknown any more.
     void noteTry(const Eigen::Vector3d& point);
     static constexpr std::uint8_t kTries = 2;
+    /// Notes whether a view that looked into the unknown from this place on had a match there.
+    void noteLook(const Eigen::Vector3d& place, bool matched);
+    /// What a look into the unknown from this place on is worth by those around it before (a cube
+    /// of 4 voxels along each edge): the share that had a match over the usual one of 0.6, in
+    /// (0, 1]; 1 before the first. Plain walls and the sky do not match, from wherever they are
+    /// looked at.
+    double lookWorth(const Eigen::Vector3d& place) const;
 
     /// Finds the voxels at whose centres a ball of radius `clearance` fits inside `limits`, with
     /// what the way between two of them needs. To be called again after changes; that costs in
@@ -175,6 +182,12 @@ class FreeSpace {
     Eigen::Vector3i size_;
     std::vector<std::uint8_t> voxels_;
     std::vector<std::uint16_t> pieces_;  ///< of surface in each voxel
+    struct Looks {
+        std::uint32_t all = 0, matched = 0;
+    };
+    static constexpr int kRegion = 4;  ///< voxels along each edge of what looks are counted in
+    std::size_t regionOf(const Eigen::Vector3i& v) const;
+    std::vector<Looks> looks_;  ///< by region; empty before the first
     /// What updateClear() found the last time: voxels that were passable, those that blocked
     /// others, and how many of those are too near to each.
     std::vector<std::uint8_t> passable_, blocking_;

@@ -57,6 +57,11 @@ class RiftLedger {
     /// `before`: their tears until then, as tear() gives them.
     void judge(const SurfaceSummary& summary, const std::vector<std::uint64_t>& keys,
                const std::vector<float>& before, const Eigen::Vector3d& eye);
+    /// What a view of a tear without a match is worth by what came of such views: the share of
+    /// tears tried that they helped to close, over the usual one of a half, of all tries and more
+    /// and more of those in the tear's own block; in (0, 1], 1 for other tears. Where a surface is
+    /// plain no view helps, and its next tear was not tried yet.
+    double tryWorth(const RiftRecord& record) const;
     /// Gives a cell up.
     void giveUp(std::uint64_t key, RiftState state, const std::string& reason);
     /// What was given up in this state may be closed after all: it is open again.
@@ -79,8 +84,13 @@ class RiftLedger {
 
     double resolution_;
     int maxAttempts_;
+    struct Tries {
+        int all = 0, helped = 0;
+    };
     std::map<std::uint64_t, RiftRecord> records_;
     std::unordered_map<std::uint64_t, std::vector<RiftRecord*>> byBlock_;
+    Tries unmatched_;                                            ///< of tears without a match
+    std::unordered_map<std::uint64_t, Tries> unmatchedByBlock_;  ///< the same
 };
 
 }  // namespace riftmap

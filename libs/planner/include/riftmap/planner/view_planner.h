@@ -53,6 +53,9 @@ class Knowledge {
 
     /// Takes in a view that was just merged into the graph.
     void update(const View& view);
+    /// Notes what came of looks into the unknown from these places on, after update() with the view
+    /// that was taken to look there.
+    void noteLooks(const View& view, const std::vector<Eigen::Vector3d>& places);
     /// Ways from where the camera is.
     void updateReach();
     /// Looks for passages too narrow for voxels (a door, the space between a wall and the end of
@@ -99,8 +102,9 @@ class Knowledge {
     /// Box of the surfaces, if it was declared.
     const std::optional<Eigen::AlignedBox3d>& surfaceBox() const { return surfaceBox_; }
     /// What a view has to promise to be worth it [m^2]: PlannerOptions::minGain of the surface
-    /// known, or if that is 0 a share of 0.0007, with exact depth 0.0001; where the box of the
-    /// surfaces is known 0.0003, with exact depth 0.0004, with DepthKind::kPixelwise 0.00055.
+    /// known, or if that is 0 a share of 0.0005, with exact depth 0.0001, with
+    /// DepthKind::kPixelwise 0.0007; where the box of the surfaces is known 0.0003, 0.0004 and
+    /// 0.00055.
     double minGain() const;
     /// True if this place was seen through and no surface of the map is within the platform's
     /// clearance, whether or not a way there is known. Thread-safe while nothing changes.

@@ -52,6 +52,9 @@ class ViewScorer {
         /// how the gap faces is a hint only. For an object: the surface of a room, seen from afar,
         /// is too sparse, and lines slip through it.
         bool gapsByLine = false;
+        /// Promises of what did not match are held against what came of such views before
+        /// (FreeSpace::lookWorth(), RiftLedger::tryWorth()).
+        bool byExperience = false;
     };
 
     /// Everything must outlive the scorer and stay as it is.
@@ -147,6 +150,7 @@ class ViewScorer {
     SensorModel sensor_;
     const SurfaceSummary* summary_;
     const FreeSpace* space_;
+    const RiftLedger* ledger_;
     Weights weights_;
     double resolution_;
     double goodDepth_;
