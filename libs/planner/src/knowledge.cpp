@@ -82,27 +82,31 @@ FreeSpace hullOf(const Eigen::AlignedBox3d& surfaces, double cell) {
     return hull;
 }
 
-/// Whether a view has matches where it sees this place: one pixel in ten around it.
-bool matchesAt(const View& view, const Eigen::Vector3d& place) {
+/// Whether a view has matches where it sees this place: one pixel in ten around it. Nothing if the
+/// place is not in the image.
+std::optional<bool> matchesAt(const View& view, const Eigen::Vector3d& place) {
     constexpr int kReach = 6;  // [px]
     const Eigen::Vector3d p = view.world_T_camera.inverse() * place;
-    if (p.z() <= 0) {
-        return false;
+    if (!(p.z() > 0.01)) {
+        return std::nullopt;
     }
     const DisparityImage& d = view.disparity;
-    const Eigen::Array2d uv = view.camera.project(p).array().round();
-    const Eigen::Array2i first = (uv - kReach).max(0.0).cast<int>();
-    const Eigen::Array2i end =
-        (uv + kReach + 1).min(Eigen::Array2d(d.width, d.height)).max(0.0).cast<int>();
+    const Eigen::Vector2d uv = view.camera.project(p);
+    if (uv.x() < d.firstColumn || uv.y() < 0 || uv.x() > d.width - 1 || uv.y() > d.height - 1) {
+        return std::nullopt;
+    }
+    const auto column = static_cast<int>(std::lround(uv.x()));
+    const auto row = static_cast<int>(std::lround(uv.y()));
     int all = 0;
     int matched = 0;
-    for (int row = first.y(); row < end.y(); ++row) {
-        for (int column = first.x(); column < end.x(); ++column) {
+    for (int r = std::max(0, row - kReach); r <= std::min(row + kReach, d.height - 1); ++r) {
+        for (int c = std::max(0, column - kReach); c <= std::min(column + kReach, d.width - 1);
+             ++c) {
             ++all;
-            matched += d.valid(column, row) ? 1 : 0;
+            matched += d.valid(c, r) ? 1 : 0;
         }
     }
-    return all > 0 && 10 * matched >= all;
+    return 10 * matched >= all;
 }
 
 }  // namespace
@@ -187,7 +191,9 @@ void Knowledge::update(const View& view) {
 void Knowledge::noteLooks(const View& view, const std::vector<Eigen::Vector3d>& places) {
     for (const Eigen::Vector3d& place : places) {
         unseen().noteTry(place);
-        unseen().noteLook(place, matchesAt(view, place));
+        if (const auto matched = matchesAt(view, place)) {
+            unseen().noteLook(place, *matched);
+        }
     }
 }
 

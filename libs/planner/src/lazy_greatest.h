@@ -23,12 +23,15 @@ std::size_t greatestOf(std::vector<double>& values, const Weigh& weigh) {
                      [&](std::size_t a, std::size_t b) { return values[a] > values[b]; });
     std::size_t best = values.size();
     double most = 0;
-    for (std::size_t first = 0; first < order.size(); first += kAtOnce) {
-        if (values[order[first]] <= 0 || values[order[first]] < most) {
+    const auto mayBe = [&](std::size_t i) { return values[i] > 0 && values[i] >= most; };
+    for (std::size_t first = 0, end = 0; first < order.size(); first = end) {
+        while (end < order.size() && end < first + kAtOnce && mayBe(order[end])) {
+            ++end;
+        }
+        if (end == first) {
             break;
         }
-        const std::span<const std::size_t> some(order.data() + first,
-                                                std::min(kAtOnce, order.size() - first));
+        const std::span<const std::size_t> some(order.data() + first, end - first);
         weigh(some);
         for (const std::size_t i : some) {
             if (values[i] > most || (values[i] == most && most > 0 && i < best)) {

@@ -141,13 +141,17 @@ void Choice::keepBestAround() {
             utilities[i] = c.utility;
         });
     });
-    candidates_ = {Candidate(candidates_[best < seen.size() ? best : 0])};
+    if (best < seen.size()) {  // as a rule: the first was picked for its gain
+        candidates_ = {Candidate(candidates_[best])};
+    } else {
+        candidates_.resize(1);
+    }
 }
 
 /// Places of the frontier that a view looks at.
 std::vector<Eigen::Vector3d> Choice::frontierSeen(const Pose& pose) const {
     std::vector<Eigen::Vector3d> places;
-    for (const Sight& s : scorer_.sights(pose).sights) {
+    for (const Sight& s : scorer_.sightsAtMost(pose).sights) {  // lines are for gaps
         const auto place = scorer_.frontierOf(s.item);
         if (place && s.item % 2 == 0 && s.share > 0.25F) {
             places.push_back(scorer_.frontier()[*place].centre.cast<double>());
@@ -173,14 +177,13 @@ std::optional<ViewPlan> Choice::makeAround(const Eigen::AlignedBox3d& box) {
         }
     }
     std::vector<TourView> views(candidates_.size());
-    std::vector<std::vector<std::uint32_t>> gaps(candidates_.size());
     parallelForEach(candidates_.size(), 4, [&](std::size_t i) {
         ViewScorer::Seen seen = scorer_.sightsAtMost(candidates_[i].pose);
         candidates_[i].score.nearShare = seen.nearShare;
         views[i].fromStart = candidates_[i].path;
         if (seen.nearShare <= 0.3) {
             views[i].sights = std::move(seen.sights);
-            gaps[i] = std::move(seen.gaps);
+            views[i].uncertain = std::move(seen.gaps);
         }
     });
     const double ball = box.sizes().mean() / 2 + k_.limits().clearance;
@@ -196,7 +199,7 @@ std::optional<ViewPlan> Choice::makeAround(const Eigen::AlignedBox3d& box) {
         },
         options,
         [&](std::size_t i, TourView& view) {
-            scorer_.dropHidden(view.sights, gaps[i], candidates_[i].pose);
+            scorer_.dropHidden(view.sights, view.uncertain, candidates_[i].pose);
         });
     pool_.clear();
     for (std::size_t i = 1; i < tour.views.size(); ++i) {

@@ -102,30 +102,43 @@ const std::vector<RiftRecord*>& RiftLedger::inBlock(std::uint64_t block) const {
     return it == byBlock_.end() ? kNone : it->second;
 }
 
-void RiftLedger::judge(const SurfaceSummary& summary, const std::vector<std::uint64_t>& keys,
-                       const std::vector<float>& before, const Eigen::Vector3d& eye) {
+std::vector<TriedTear> RiftLedger::tears(const std::vector<std::uint64_t>& keys,
+                                         double cellSize) const {
+    std::vector<TriedTear> tears;
+    for (const std::uint64_t key : keys) {
+        const auto it = records_.find(key);
+        if (it != records_.end()) {
+            tears.push_back({key, tear(it->second.cell, cellSize), it->second.cell.kinds});
+        }
+    }
+    return tears;
+}
+
+void RiftLedger::judge(const SurfaceSummary& summary, const std::vector<TriedTear>& tried,
+                       const Eigen::Vector3d& eye) {
     constexpr float kHelped = 0.75F;
-    for (std::size_t i = 0; i < keys.size(); ++i) {
-        const auto it = records_.find(keys[i]);
+    for (const TriedTear& before : tried) {
+        const auto it = records_.find(before.key);
         if (it == records_.end()) {
             continue;
         }
         RiftRecord& r = it->second;
-        const bool helped =
-            r.state != RiftState::kOpen || tear(r.cell, summary.cellSize()) <= kHelped * before[i];
-        if ((r.cell.kinds & kNoMatch) != 0) {
-            for (Tries* t : {&unmatched_, &unmatchedByBlock_[SurfaceSummary::blockOf(keys[i])]}) {
+        const bool helped = r.state == RiftState::kResolved ||
+                            tear(r.cell, summary.cellSize()) <= kHelped * before.size;
+        if ((before.kinds & kNoMatch) != 0) {
+            Tries& inBlock = unmatchedByBlock_[SurfaceSummary::blockOf(before.key)];
+            for (Tries* t : {&unmatched_, &inBlock}) {
                 ++t->all;
                 t->helped += helped ? 1 : 0;
             }
         }
-        if (helped) {
+        if (helped || r.state != RiftState::kOpen) {
             continue;
         }
         const Eigen::Vector3f ray = eye.cast<float>() - r.cell.openPosition;
         r.attempts.push_back({ray.normalized(), ray.norm()});
         if (static_cast<int>(r.attempts.size()) >= maxAttempts_) {
-            giveUp(keys[i], RiftState::kBelowResolution, vainReason(r));
+            giveUp(before.key, RiftState::kBelowResolution, vainReason(r));
         }
     }
 }

@@ -72,15 +72,9 @@ void SurfaceExplorer::look(const std::optional<ViewPlan>& plan, double planMs) {
     step.riftsMs = msSince(t);
 
     t = Clock::now();
-    std::vector<float> before;
+    std::vector<TriedTear> tried;
     if (plan) {
-        for (const std::uint64_t key : plan->cells) {
-            const auto it = knowledge_.ledger().records().find(key);
-            before.push_back(
-                it == knowledge_.ledger().records().end()
-                    ? 0.0F
-                    : knowledge_.ledger().tear(it->second.cell, knowledge_.summary().cellSize()));
-        }
+        tried = knowledge_.ledger().tears(plan->cells, knowledge_.summary().cellSize());
     }
     std::vector<Eigen::Vector3d> unknown;
     if (plan) {
@@ -93,8 +87,7 @@ void SurfaceExplorer::look(const std::optional<ViewPlan>& plan, double planMs) {
     step.newArea = summary.newArea();
     step.wellKnownArea = summary.area() - areaBefore - (summary.coarseArea() - coarseBefore);
     if (plan) {
-        knowledge_.ledger().judge(knowledge_.summary(), plan->cells, before,
-                                  view.world_T_camera.translation);
+        knowledge_.ledger().judge(knowledge_.summary(), tried, view.world_T_camera.translation);
         knowledge_.noteLooks(view, unknown);
         step.gain = plan->gain;
         step.coarseGain = plan->coarseGain;

@@ -159,7 +159,7 @@ SurfaceCell toCell(const Sums& s, std::uint64_t key, double cell) {
     return c;
 }
 
-constexpr int kSide = 8;  ///< cells of a block along each edge
+constexpr int kSide = SurfaceSummary::kCellsPerSide;
 
 /// Of a cell, counted from the block's corner, in lists of all its cells.
 std::size_t indexInBlock(const Eigen::Vector3i& cell) {
@@ -227,19 +227,17 @@ const SurfaceCell* SurfaceSummary::find(std::uint64_t key) const {
 /// Spreads the blocks over a grid, so that a line that meets many need not search for each.
 void SurfaceSummary::spreadBlocks() {
     constexpr double kMost = 1 << 20;
+    grid_ = {};
     Eigen::AlignedBox3i box;
     for (const auto& [key, block] : blocks_) {
         box.extend(unpack(key));
     }
-    const Eigen::Vector3i size = box.isEmpty() ? Eigen::Vector3i::Zero().eval()
-                                               : (box.sizes() + Eigen::Vector3i::Ones()).eval();
-    grid_ = {};
-    if (size.cast<double>().prod() > kMost) {
-        return;  // a few of them lie far off
+    if (blocks_.empty() || (box.sizes().cast<double>().array() + 1).prod() > kMost) {
+        return;  // or a few of them lie far off
     }
     grid_.low = box.min();
-    grid_.size = size;
-    grid_.blocks.assign(static_cast<std::size_t>(size.prod()), nullptr);
+    grid_.size = box.sizes() + Eigen::Vector3i::Ones();
+    grid_.blocks.assign(static_cast<std::size_t>(grid_.size.prod()), nullptr);
     for (const auto& [key, block] : blocks_) {
         grid_.blocks[grid_.index(unpack(key) - grid_.low)] = &block;
     }
@@ -257,7 +255,7 @@ const SurfaceSummary::Block* SurfaceSummary::blockAt(const Eigen::Vector3i& at) 
 bool SurfaceSummary::openTowards(const Eigen::Vector3f& place, const Eigen::Vector3f& eye,
                                  float reach) const {
     constexpr float kFirst = 2.2F, kStep = 0.75F;  // [parts]
-    static_assert(kParts == 4 && kCellsPerSide == kSide);
+    static_assert(kParts == 4 && kCellsPerSide == 8);
     const float scale = kParts / static_cast<float>(cell_);
     const Eigen::Vector3f start = scale * place;
     const Eigen::Vector3f way = scale * eye - start;

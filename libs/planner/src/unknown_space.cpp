@@ -55,9 +55,8 @@ void FreeSpace::noteLook(const Eigen::Vector3d& place, bool matched) {
 }
 
 double FreeSpace::lookWorth(const Eigen::Vector3d& place) const {
-    constexpr double kUsual =
-        0.6;                       // share of matches: near edges and at flat angles there are none
-    constexpr double kBefore = 8;  // looks taken to have matched, so that a few tell little
+    constexpr double kUsual = 0.6;  // of looks match: near edges and at flat angles none do
+    constexpr double kBefore = 8;   // looks (one view has several here) taken to have matched
     const Eigen::Vector3i v = voxelOf(place);
     if (looks_.empty() || !inside(v)) {
         return 1;

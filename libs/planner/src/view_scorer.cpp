@@ -382,22 +382,14 @@ std::optional<std::size_t> ViewScorer::frontierOf(std::uint32_t item) const {
 ViewScorer::Seen ViewScorer::sights(const Pose& world_T_camera) const {
     Seen seen = sightsAtMost(world_T_camera);
     dropHidden(seen.sights, seen.gaps, world_T_camera);
-    seen.gaps.clear();
     return seen;
 }
 
-void ViewScorer::dropHidden(std::vector<Sight>& sights, const std::vector<std::uint32_t>& gaps,
+void ViewScorer::dropHidden(std::vector<Sight>& sights, std::vector<std::uint32_t>& gaps,
                             const Pose& world_T_camera) const {
-    auto gap = gaps.begin();
-    std::size_t kept = 0;
-    for (std::size_t i = 0; i < sights.size(); ++i) {
-        const bool isGap = gap != gaps.end() && *gap == i;
-        gap += isGap ? 1 : 0;
-        if (!isGap || openTo(open_[sights[i].item / 2]->cell, world_T_camera)) {
-            sights[kept++] = sights[i];
-        }
-    }
-    sights.resize(kept);
+    settleSights(sights, gaps, [&](const Sight& gap) {
+        return openTo(open_[gap.item / 2]->cell, world_T_camera);
+    });
 }
 
 ViewScorer::Seen ViewScorer::sightsAtMost(const Pose& world_T_camera) const {

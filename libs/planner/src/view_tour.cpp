@@ -125,7 +125,7 @@ class Picker {
           options_(options),
           settle_(&settle),
           seen_(worth),
-          settled_(views.size(), settle ? 0 : 1),
+          left_(settle ? options.maxSettled : 0),
           gains_(views.size()) {
         parallelForEach(views.size(), 16, [&](std::size_t v) { gains_[v] = seen_.gain(views[v]); });
     }
@@ -144,10 +144,14 @@ class Picker {
             }
         }
         const std::size_t best = greatestOf(utilities, [&](std::span<const std::size_t> some) {
-            dropBeyondMost(some);
+            leaveOutWhatIsTooMany(some);
             parallelForEach(some.size(), 1, [&](std::size_t i) {
                 const std::size_t v = some[i];
-                weigh(v);
+                TourView& view = (*views_)[v];
+                if (!view.uncertain.empty()) {
+                    (*settle_)(v, view);
+                }
+                gains_[v] = seen_.gain(view);
                 utilities[v] = gains_[v] > options_.minGain ? gains_[v] / costs[v] : 0.0;
             });
         });
@@ -161,22 +165,18 @@ class Picker {
     }
 
  private:
-    /// Once enough views were settled the others are left out.
-    void dropBeyondMost(std::span<const std::size_t> some) {
+    void leaveOutWhatIsTooMany(std::span<const std::size_t> some) {
         for (const std::size_t v : some) {
-            if (settled_[v] == 0 && count_++ >= options_.maxSettled) {
-                settled_[v] = 1;
-                (*views_)[v].sights.clear();
+            TourView& view = (*views_)[v];
+            if (view.uncertain.empty()) {
+                continue;
+            }
+            if (left_ > 0) {
+                --left_;
+            } else {
+                settleSights(view.sights, view.uncertain, [](const Sight&) { return false; });
             }
         }
-    }
-
-    void weigh(std::size_t v) {
-        if (settled_[v] == 0) {
-            (*settle_)(v, (*views_)[v]);
-            settled_[v] = 1;
-        }
-        gains_[v] = seen_.gain((*views_)[v]);
     }
 
     std::vector<TourView>* views_;
@@ -184,8 +184,7 @@ class Picker {
     TourOptions options_;
     const SightsSettle* settle_;
     SeenItems seen_;
-    std::vector<std::uint8_t> settled_;
-    std::size_t count_ = 0;      ///< of those that were settled
+    std::size_t left_;           ///< views that may still be settled
     std::vector<double> gains_;  ///< at most, of views not picked
 };
 

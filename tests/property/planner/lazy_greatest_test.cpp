@@ -34,6 +34,7 @@ TEST(GreatestOf, isThatOfAllValuesAndAsksForFew) {
                              [&](std::span<const std::size_t> indices) {
                                  for (const std::size_t i : indices) {
                                      EXPECT_TRUE(some.insert(i).second) << "asked twice: " << i;
+                                     EXPECT_GT(values[i], 0);
                                      values[i] = exact[i];
                                  }
                              }),

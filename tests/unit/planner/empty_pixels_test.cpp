@@ -157,7 +157,8 @@ TEST(EmptyPixels, ofExactDepthAreProvenWhereNothingCanBeTooNear) {
         SCOPED_TRACE("seed " + std::to_string(seed));
         std::mt19937 random(seed);
         std::uniform_real_distribution<double> in(-1, 1);
-        const View view = Spheres(random).view();
+        View view = Spheres(random).view();
+        view.world_T_camera = lookAt({0.02, -0.01, 0.03}, {0.3 * in(random), 0.3 * in(random), 1});
         // What may hold surface begins somewhere in the space before the near limit.
         const Eigen::Vector3d low(0.3 * in(random), 0.3 * in(random), 0.4 + 0.3 * in(random));
         const Eigen::AlignedBox3d surfaces(low, low + Eigen::Vector3d::Ones());
@@ -179,7 +180,7 @@ TEST(EmptyPixels, ofExactDepthAreProvenWhereNothingCanBeTooNear) {
                 const double end = 0.53 / ray.z();
                 bool slow = !view.disparity.valid(column, row);
                 for (double s = 0.1; slow && s < end + 0.25 * 0.07; s += 0.25 * 0.07) {
-                    slow = proven(std::min(s, end) * ray);
+                    slow = proven(view.world_T_camera * Eigen::Vector3d(std::min(s, end) * ray));
                 }
                 ASSERT_EQ(empty.proven[i] != 0, slow) << column << " " << row;
                 ++count[slow ? 1 : 0];

@@ -104,18 +104,18 @@ TEST_F(LedgerOnWall, aTearThatIsClosedIsResolved) {
 TEST_F(LedgerOnWall, vainTriesAreNotRepeatedAndEndTheTear) {
     const std::uint64_t key = anyOpen();
     const RiftRecord& record = ledger.records().at(key);
-    const float before = ledger.tear(record.cell, summary.cellSize());
+    const auto before = ledger.tears({key}, summary.cellSize());
     const Eigen::Vector3d p = record.cell.openPosition.cast<double>();
     const Eigen::Vector3d eye = p + Eigen::Vector3d(-1, 0, 0);
     EXPECT_FALSE(RiftLedger::tried(record, eye));
-    ledger.judge(summary, {key}, {before}, eye);
+    ledger.judge(summary, before, eye);
     EXPECT_TRUE(RiftLedger::tried(record, eye));
     EXPECT_TRUE(RiftLedger::tried(record, eye + Eigen::Vector3d(0, 0.1, 0)));
     EXPECT_FALSE(RiftLedger::tried(record, p + Eigen::Vector3d(-1, 1, 0)));    // another side
     EXPECT_FALSE(RiftLedger::tried(record, p + Eigen::Vector3d(-0.4, 0, 0)));  // nearer
-    ledger.judge(summary, {key}, {before}, p + Eigen::Vector3d(-1, 1, 0));
+    ledger.judge(summary, before, p + Eigen::Vector3d(-1, 1, 0));
     EXPECT_EQ(record.state, RiftState::kOpen);
-    ledger.judge(summary, {key}, {before}, p + Eigen::Vector3d(-1, -1, 0));
+    ledger.judge(summary, before, p + Eigen::Vector3d(-1, -1, 0));
     EXPECT_EQ(record.state, RiftState::kBelowResolution);
     EXPECT_EQ(record.attempts.size(), 3U);
     EXPECT_FALSE(record.reason.empty());
@@ -124,7 +124,7 @@ TEST_F(LedgerOnWall, vainTriesAreNotRepeatedAndEndTheTear) {
 TEST_F(LedgerOnWall, aTryThatHelpedIsNoAttempt) {
     const std::uint64_t key = anyOpen();
     const float tear = ledger.tear(ledger.records().at(key).cell, summary.cellSize());
-    ledger.judge(summary, {key}, {4 * tear}, {0, 0, 0});
+    ledger.judge(summary, {{key, 4 * tear, kImageBorder}}, {0, 0, 0});
     EXPECT_TRUE(ledger.records().at(key).attempts.empty());
 }
 
@@ -161,7 +161,7 @@ TEST_F(LedgerOnWall, triesInVainMakeOtherTearsWithoutAMatchWorthLess) {
     const std::uint64_t other = *std::find_if(unmatched.begin(), unmatched.end(),
                                               [&](std::uint64_t key) { return !near(key); });
     const auto judge = [&](std::uint64_t key, float before) {
-        tears.judge(cells, {key}, {before}, {0, 0, 0});
+        tears.judge(cells, {{key, before, kNoMatch}}, {0, 0, 0});
     };
     for (int i = 0; i < 20; ++i) {
         judge(unmatched.front(), 0);
@@ -176,6 +176,15 @@ TEST_F(LedgerOnWall, triesInVainMakeOtherTearsWithoutAMatchWorthLess) {
     }
     EXPECT_EQ(worth(unmatched.front()), 1.0);
     EXPECT_EQ(worth(other), 1.0);
+    // One that was given up was not closed; what it was before the view counts.
+    tears.giveUp(other, RiftState::kDeferred, "no way there");
+    for (int i = 0; i < 200; ++i) {
+        judge(other, 0);
+        tears.judge(cells, {{border, 0, kImageBorder}}, {0, 0, 0});
+    }
+    EXPECT_LT(worth(other), 0.5);
+    EXPECT_TRUE(tears.records().at(other).attempts.empty());
+    EXPECT_EQ(worth(border), 1.0);
 }
 
 TEST_F(LedgerOnWall, whatWasUnreachableOpensAgainAndNothingElse) {

@@ -16,8 +16,9 @@ namespace riftmap {
 /// What is to be said of a tear in the surface.
 enum class RiftState {
     kOpen,             ///< a view may close it
-    kDeferred,         ///< it may, but the run ended before (limits on views, metres, seconds), or
-                       ///< no way is known to the free places that see it
+    kDeferred,         ///< it may, but the run ended before (limits on views, metres, seconds), no
+                       ///< way is known to the free places that see it, or it is one of too many
+                       ///< small ones to be looked at by itself
     kUnreachable,      ///< no place known to be free lies within the range of it
     kUnobservable,     ///< hidden from every place that can be reached
     kBelowResolution,  ///< smaller than the surface was asked to be known, or too small to be worth
@@ -44,6 +45,13 @@ struct RiftRecord {
     std::uint32_t verticesThen = 0;  ///< in the cell when it was given up
 };
 
+/// A tear before the view that is to close it.
+struct TriedTear {
+    std::uint64_t key;   ///< of its cell
+    float size;          ///< as RiftLedger::tear() has it [m^2]
+    std::uint8_t kinds;  ///< OpenKind bits
+};
+
 /// The memory of the run: every tear that was ever seen, by cell. A try that closed nothing is
 /// remembered; after several different ones the tear is given up, until the surface at it changes.
 class RiftLedger {
@@ -53,10 +61,11 @@ class RiftLedger {
 
     /// Reads the cells that changed.
     void update(const SurfaceSummary& summary);
-    /// A view from `eye` was taken to close these cells, and has been merged and summed up.
-    /// `before`: their tears until then, as tear() gives them.
-    void judge(const SurfaceSummary& summary, const std::vector<std::uint64_t>& keys,
-               const std::vector<float>& before, const Eigen::Vector3d& eye);
+    /// The tears of these cells as they are, for judge().
+    std::vector<TriedTear> tears(const std::vector<std::uint64_t>& keys, double cellSize) const;
+    /// A view from `eye` was taken to close these tears, and has been merged and summed up.
+    void judge(const SurfaceSummary& summary, const std::vector<TriedTear>& tried,
+               const Eigen::Vector3d& eye);
     /// What a view of a tear without a match is worth by what came of such views: the share of
     /// tears tried that they helped to close, over the usual one of a half, of all tries and more
     /// and more of those in the tear's own block; in (0, 1], 1 for other tears. Where a surface is

@@ -58,6 +58,8 @@ class SurfaceSummary {
     /// Cells with fewer vertices may be noise: they hide nothing and stand in no way.
     static constexpr std::uint32_t kLeastVertices = 3;
 
+    static constexpr int kCellsPerSide = 8;  ///< of a block, along each edge
+
     double cellSize() const { return cell_; }
     /// Sums up anew all blocks of cells that this view has surface in or looks through. `seen`:
     /// what all views saw through, for `hidden`.
@@ -107,8 +109,6 @@ class SurfaceSummary {
     double coarseArea() const { return coarseArea_; }
 
  private:
-    static constexpr int kCellsPerSide = 8;
-
     Block build(const PixelGraph& graph, std::uint64_t blockKey, const SeenThrough* seen) const;
     std::vector<std::uint64_t> blocksSeen(const View& view) const;
     std::size_t newParts(const Block& now) const;

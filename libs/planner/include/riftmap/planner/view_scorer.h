@@ -77,7 +77,8 @@ class ViewScorer {
         double coarseArea = 0;        ///< part of the area: surface known better [m^2]
     };
     Benefit benefit(const RiftRecord& record, const Pose& world_T_camera) const;
-    /// Share of a tear's worth that is left after the views of it that did not help.
+    /// Share of a tear's worth that is left after the views of it that did not help, and
+    /// (byExperience) by what came of views of others like it.
     double leftAfterTries(const RiftRecord& record) const;
 
     const std::vector<const RiftRecord*>& open() const { return open_; }
@@ -107,8 +108,8 @@ class ViewScorer {
     /// Thread-safe.
     Seen sightsAtMost(const Pose& world_T_camera) const;
     /// Takes those of the gaps out of `sights` that the view does not see into, by the lines from
-    /// them to its cameras. Thread-safe.
-    void dropHidden(std::vector<Sight>& sights, const std::vector<std::uint32_t>& gaps,
+    /// them to its cameras; none is uncertain then. Thread-safe.
+    void dropHidden(std::vector<Sight>& sights, std::vector<std::uint32_t>& gaps,
                     const Pose& world_T_camera) const;
     /// Of a cell's two items or a place's, the first.
     static bool isTear(std::uint32_t item) { return item % 2 == 0; }

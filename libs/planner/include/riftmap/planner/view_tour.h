@@ -18,13 +18,34 @@ struct Sight {
 struct TourView {
     std::vector<Sight> sights;  ///< each item at most once
     double fromStart = 0;       ///< length of the way to it from where the camera is [m]
+    /// Ascending positions in `sights` of what it may not show after all.
+    std::vector<std::uint32_t> uncertain = {};
 };
 
+/// Takes out of the sights at the uncertain positions those that keep(sight) denies.
+template <class Keep>
+void settleSights(std::vector<Sight>& sights, std::vector<std::uint32_t>& uncertain,
+                  const Keep& keep) {
+    auto next = uncertain.begin();
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < sights.size(); ++i) {
+        const bool isUncertain = next != uncertain.end() && *next == i;
+        next += isUncertain ? 1 : 0;
+        if (!isUncertain || keep(sights[i])) {
+            sights[kept++] = sights[i];
+        }
+    }
+    sights.resize(kept);
+    uncertain.clear();
+}
+
 struct TourOptions {
-    double viewCost = 1.0;         ///< of a view, as length of path [m], > 0
-    double minGain = 0.0;          ///< a view that adds no more than this is left out
-    std::size_t maxViews = 10;     ///< stops at most; the order is exact: 2^n n^2 steps, n <= 16
-    std::size_t maxSettled = 150;  ///< views asked about, see planTour(); the others are left out
+    double viewCost = 1.0;      ///< of a view, as length of path [m], > 0
+    double minGain = 0.0;       ///< a view that adds no more than this is left out
+    std::size_t maxViews = 10;  ///< stops at most; the order is exact: 2^n n^2 steps, n <= 16
+    /// Candidates that `settle` is asked about, see planTour(); of the others nothing uncertain
+    /// counts.
+    std::size_t maxSettled = 150;
     /// Cost of a metre (or a view) once nothing is left to see, >= 0; while there is, the share
     /// R(k) of tourCost() is added. 0 = early gain alone counts, large = the length alone.
     double tail = 0.2;
@@ -59,7 +80,7 @@ class SeenItems {
 /// Length of the way between two candidates [m].
 using WayLength = std::function<double(std::size_t, std::size_t)>;
 
-/// Takes out of a candidate's sights, given with its index, what it does not show after all. It is
+/// Settles the uncertain sights of the candidate with this index, as settleSights() does. It is
 /// called once at most for each, for several candidates at a time from several threads.
 using SightsSettle = std::function<void(std::size_t, TourView&)>;
 
@@ -73,9 +94,9 @@ double tourCost(const std::vector<TourView>& views, const std::vector<float>& wo
 
 /// Picks views that complement each other, each the best gain for its cost given those picked
 /// before it (cost: view and detour), until none adds more than `minGain`; then orders them with
-/// least tourCost(), exactly. With `settle` the sights are what a view may show at most, and those
-/// that may be picked are settled before, best first, up to `maxSettled`: but for that limit the
-/// tour is the one that settling all of them beforehand leads to. Deterministic; time grows with
+/// least tourCost(), exactly. Views with uncertain sights are settled before they are picked, best
+/// first, `maxSettled` at most: but for that limit the tour is the one that settling all of them
+/// beforehand leads to. Without `settle` nothing uncertain counts. Deterministic; time grows with
 /// views * items * maxViews.
 ViewTour planTour(std::vector<TourView> views, const std::vector<float>& worth,
                   const WayLength& between, const TourOptions& options,
