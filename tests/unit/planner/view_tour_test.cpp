@@ -208,7 +208,9 @@ struct UncertainScene : Scene {
             }
         }
     }
-    static bool isTrue(std::size_t index, const Sight& s) { return (s.item * 7 + index) % 3 > 0; }
+    static bool isTrue(std::size_t index, const Sight& s) {
+        return (std::size_t{7} * s.item + index) % 3 > 0;
+    }
     static void settle(std::size_t index, TourView& view) {
         settleSights(view.sights, view.uncertain, [&](const Sight& s) { return isTrue(index, s); });
     }
