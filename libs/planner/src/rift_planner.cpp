@@ -404,8 +404,10 @@ void Choice::giveUp(const RiftRecord& record, bool reachable, bool visible) {
 /// that even these do not help is given up, with the reason. Where thousands are left that no view
 /// closes (plain walls) the largest speak for the others.
 std::optional<ViewPlan> Choice::lastResorts() {
-    constexpr std::size_t kMost = 2000;  // 5 ms each, more where many are open
     std::vector<const RiftRecord*> left = scorer_.open();
+    // A look takes 5 ms, but longer where many are open.
+    const std::size_t most =
+        std::min<std::size_t>(2000, 60000000 / std::max<std::size_t>(left.size(), 1));
     const double cell = k_.summary().cellSize();
     std::stable_sort(left.begin(), left.end(), [&](const RiftRecord* a, const RiftRecord* b) {
         return k_.ledger().tear(a->cell, cell) > k_.ledger().tear(b->cell, cell);
@@ -423,9 +425,9 @@ std::optional<ViewPlan> Choice::lastResorts() {
             giveUp(*record, true, true);
             continue;
         }
-        if (++count > kMost) {
+        if (++count > most) {
             k_.ledger().giveUp(record->cell.key, RiftState::kDeferred,
-                               "not looked at by itself: no view of " + std::to_string(kMost) +
+                               "not looked at by itself: no view of " + std::to_string(most) +
                                    " larger ones was worth taking");
             continue;
         }
