@@ -255,7 +255,7 @@ const SurfaceSummary::Block* SurfaceSummary::blockAt(const Eigen::Vector3i& at) 
 bool SurfaceSummary::openTowards(const Eigen::Vector3f& place, const Eigen::Vector3f& eye,
                                  float reach) const {
     constexpr float kFirst = 2.2F, kStep = 0.75F;  // [parts]
-    static_assert(kParts == 4 && kCellsPerSide == 8);
+    static_assert(kParts == 4);
     const float scale = kParts / static_cast<float>(cell_);
     const Eigen::Vector3f start = scale * place;
     const Eigen::Vector3f way = scale * eye - start;

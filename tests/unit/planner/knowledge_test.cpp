@@ -173,7 +173,9 @@ TEST_F(Slit, looksKnowWhetherTheViewHadAMatchThere) {
         return space.firstUnknown(from, p.normalized(), 1.1 * step).begin;
     };
     EXPECT_LT(begin(plain), 0);
+    EXPECT_LT(begin(besideImage), 0);
     EXPECT_GT(begin({1.5, -0.8, 0}), 0);
+    EXPECT_GT(begin({1.5, -1.9, 0}), 0);
 }
 
 }  // namespace
