@@ -76,10 +76,6 @@ void SurfaceExplorer::look(const std::optional<ViewPlan>& plan, double planMs) {
     if (plan) {
         tried = knowledge_.ledger().tears(plan->cells, knowledge_.summary().cellSize());
     }
-    std::vector<Eigen::Vector3d> unknown;
-    if (plan) {
-        unknown = plan->unknown;
-    }
     const SurfaceSummary& summary = knowledge_.summary();
     const double areaBefore = summary.area();
     const double coarseBefore = summary.coarseArea();
@@ -88,7 +84,7 @@ void SurfaceExplorer::look(const std::optional<ViewPlan>& plan, double planMs) {
     step.wellKnownArea = summary.area() - areaBefore - (summary.coarseArea() - coarseBefore);
     if (plan) {
         knowledge_.ledger().judge(knowledge_.summary(), tried, view.world_T_camera.translation);
-        knowledge_.noteLooks(view, unknown);
+        knowledge_.noteLooks(view, plan->unknown);
         step.gain = plan->gain;
         step.coarseGain = plan->coarseGain;
         step.unknownGain = plan->unknownGain;

@@ -159,12 +159,11 @@ SurfaceCell toCell(const Sums& s, std::uint64_t key, double cell) {
     return c;
 }
 
-constexpr int kSide = SurfaceSummary::kCellsPerSide;
-
 /// Of a cell, counted from the block's corner, in lists of all its cells.
 std::size_t indexInBlock(const Eigen::Vector3i& cell) {
-    const std::ptrdiff_t row = std::ptrdiff_t{cell.z()} * kSide + cell.y();
-    return static_cast<std::size_t>(row * kSide + cell.x());
+    constexpr int n = SurfaceSummary::kCellsPerSide;
+    const std::ptrdiff_t row = std::ptrdiff_t{cell.z()} * n + cell.y();
+    return static_cast<std::size_t>(row * n + cell.x());
 }
 
 double coarseIn(const SurfaceSummary::Block& block) {
@@ -366,6 +365,7 @@ void SurfaceSummary::update(const PixelGraph& graph, const View& view, const See
     newArea_ = static_cast<double>(std::accumulate(isNew.begin(), isNew.end(), std::size_t{0})) *
                std::pow(cell_ / kParts, 2) / 1.5;
     former_.assign(changed_.size(), {});
+    bool sameBlocks = true;
     for (std::size_t i = 0; i < changed_.size(); ++i) {
         const auto it = blocks_.find(changed_[i]);
         if (it != blocks_.end()) {
@@ -373,6 +373,7 @@ void SurfaceSummary::update(const PixelGraph& graph, const View& view, const See
         }
         cellCount_ += rebuilt[i].cells.size() - former_[i].cells.size();
         coarseArea_ += coarseIn(rebuilt[i]) - coarseIn(former_[i]);
+        sameBlocks = sameBlocks && (it != blocks_.end()) != rebuilt[i].cells.empty();
         if (!rebuilt[i].cells.empty()) {
             box_.extend(rebuilt[i].box.cast<float>());
             blocks_[changed_[i]] = std::move(rebuilt[i]);
@@ -380,7 +381,9 @@ void SurfaceSummary::update(const PixelGraph& graph, const View& view, const See
             blocks_.erase(it);
         }
     }
-    spreadBlocks();
+    if (!sameBlocks) {
+        spreadBlocks();
+    }
 }
 
 /// Parts of the block's cells that hold a vertex while neither they nor a part that shares a face

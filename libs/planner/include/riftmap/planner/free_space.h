@@ -171,6 +171,8 @@ class FreeSpace {
     /// Of pixels without a match: true if nothing lies nearer than the near limit, by `sensor`'s
     /// clearance and by what was proven before.
     bool nothingTooNear(const View& view, const SensorModel& sensor, int column, int row) const;
+    /// The same for a rectangle of pixels at once, both corners (column, row) included; false may
+    /// be said where each of them by itself is clear.
     bool nothingTooNear(const View& view, const SensorModel& sensor, const Eigen::Vector2i& first,
                         const Eigen::Vector2i& last) const;
     void searchFrom(const Eigen::Vector3i& start, const Fits& fits);
