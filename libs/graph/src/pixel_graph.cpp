@@ -5,6 +5,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "distance_kernel.h"
 #include "pixel_graph_impl.h"
 
 namespace riftmap {
@@ -103,43 +104,22 @@ Vertex PixelGraph::vertex(VertexId id) const {
 std::optional<VertexId> PixelGraph::nearest(const Eigen::Vector3f& point, float radius) const {
     const Eigen::Vector3f reach = Eigen::Vector3f::Constant(radius);
     const GraphStorage& s = storage();
-    // The page whose box is nearest first: it leaves little to look at in the others.
-    std::uint32_t first = GraphStorage::kNoBlock;
-    float nearestBox = radius * radius;
-    s.forEachBlockIn(point - reach, point + reach, [&](std::uint32_t block) {
-        for (const std::uint32_t index : s.blocks()[block].pages) {
-            const float outside = s.bounds(index).squaredDistance(point);
-            if (outside < nearestBox || first == GraphStorage::kNoBlock) {
-                nearestBox = outside;
-                first = index;
-            }
-        }
-    });
-    if (first == GraphStorage::kNoBlock) {
-        return std::nullopt;
-    }
     float least = radius * radius;
     VertexId found = kNoVertex;
-    const auto look = [&](std::uint32_t index) {
-        const Page& page = s.page(index);
-        forEachBit(page.alive, [&](std::uint32_t slot) {
-            const float dx = page.x[slot] - point.x();
-            const float dy = page.y[slot] - point.y();
-            const float dz = page.z[slot] - point.z();
-            const float squared = dx * dx + dy * dy + dz * dz;
-            const VertexId id = GraphStorage::idOf(index, slot);
-            if (squared < least || (squared == least && id < found)) {
-                least = squared;
-                found = id;
-            }
-        });
-    };
-    look(first);
     s.forEachBlockIn(point - reach, point + reach, [&](std::uint32_t block) {
         for (const std::uint32_t index : s.blocks()[block].pages) {
-            if (index != first && s.bounds(index).squaredDistance(point) <= least) {
-                look(index);
+            if (s.bounds(index).squaredDistance(point) > least) {
+                continue;
             }
+            const Page& page = s.page(index);
+            forEachBit(verticesWithin(page, point, least), [&](std::uint32_t slot) {
+                const float squared = squaredDistance(page, slot, point);
+                const VertexId id = GraphStorage::idOf(index, slot);
+                if (squared < least || (squared == least && id < found)) {
+                    least = squared;
+                    found = id;
+                }
+            });
         }
     });
     return found == kNoVertex ? std::nullopt : std::optional<VertexId>(found);
@@ -149,21 +129,12 @@ bool PixelGraph::anyWithin(const Eigen::Vector3f& point, float radius) const {
     const Eigen::Vector3f reach = Eigen::Vector3f::Constant(radius);
     const GraphStorage& s = storage();
     const float limit = radius * radius;
-    const auto holds = [&](const Page& page) {
-        std::uint64_t near = 0;
-        for (std::uint32_t slot = 0; slot < Page::kSize; ++slot) {
-            const float dx = page.x[slot] - point.x();
-            const float dy = page.y[slot] - point.y();
-            const float dz = page.z[slot] - point.z();
-            near |= std::uint64_t{dx * dx + dy * dy + dz * dz <= limit} << slot;
-        }
-        return (near & page.alive) != 0;
-    };
     bool found = false;
     s.forEachBlockIn(point - reach, point + reach, [&](std::uint32_t block) {
         const auto& pages = s.blocks()[block].pages;
         found = found || std::any_of(pages.begin(), pages.end(), [&](std::uint32_t index) {
-                    return s.bounds(index).squaredDistance(point) <= limit && holds(s.page(index));
+                    return s.bounds(index).squaredDistance(point) <= limit &&
+                           verticesWithin(s.page(index), point, limit) != 0;
                 });
     });
     return found;

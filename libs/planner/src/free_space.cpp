@@ -13,7 +13,7 @@ namespace riftmap {
 namespace {
 
 constexpr float kFar = std::numeric_limits<float>::infinity();
-constexpr std::uint32_t kNoParent = 0xFFFFFFFFU;
+constexpr float kWall = -1;  ///< less than any distance: no way is sought
 const std::array<Eigen::Vector3i, 6> kFaces = {Eigen::Vector3i(1, 0, 0), Eigen::Vector3i(-1, 0, 0),
                                                Eigen::Vector3i(0, 1, 0), Eigen::Vector3i(0, -1, 0),
                                                Eigen::Vector3i(0, 0, 1), Eigen::Vector3i(0, 0, -1)};
@@ -230,19 +230,31 @@ bool FreeSpace::fitsAt(std::size_t voxel, const Fits& fits) {
 }
 
 void FreeSpace::searchFrom(const Eigen::Vector3i& start, const Fits& fits) {
-    distance_.assign(voxels_.size(), kFar);
-    parent_.assign(voxels_.size(), kNoParent);
+    distance_.resize(voxels_.size());
+    for (std::size_t i = 0; i < voxels_.size(); ++i) {
+        distance_[i] = clear_[i] != 0 || fits ? kFar : kWall;
+    }
+    step_.assign(voxels_.size(), kNoStep);
     struct Step {
         Eigen::Vector3i offset;
-        std::ptrdiff_t jump;  ///< in the array
-        float length;
+        std::ptrdiff_t jump = 0;  ///< in the array
+        float length = 0;
+        /// What may follow it on a shortest way: steps to voxels that do not touch the one it comes
+        /// from, for that one reaches those sooner.
+        std::vector<std::uint8_t> next;
     };
-    std::vector<Step> steps;
-    for (const Eigen::Vector3i& o : ball(1.8)) {
-        if (o != Eigen::Vector3i::Zero()) {
-            const std::ptrdiff_t jump =
-                (static_cast<std::ptrdiff_t>(o.z()) * size_.y() + o.y()) * size_.x() + o.x();
-            steps.push_back({o, jump, static_cast<float>(o.cast<double>().norm() * voxel_)});
+    std::array<Step, kAroundVoxel> steps;
+    for (std::uint8_t i = 0; i < kAroundVoxel; ++i) {
+        const Eigen::Vector3i o = aroundVoxel(i);
+        Step& s = steps.at(i);
+        s.offset = o;
+        s.jump = (static_cast<std::ptrdiff_t>(o.z()) * size_.y() + o.y()) * size_.x() + o.x();
+        s.length = static_cast<float>(o.cast<double>().norm() * voxel_);
+        for (std::uint8_t next = 0; next < kAroundVoxel; ++next) {
+            const Eigen::Vector3i both = o + aroundVoxel(next);
+            if (next != kNoStep && (i == kNoStep || both.cwiseAbs().maxCoeff() > 1)) {
+                s.next.push_back(next);
+            }
         }
     }
     // No step is shorter than a voxel, so voxels whose distances share a bucket of that width
@@ -251,27 +263,33 @@ void FreeSpace::searchFrom(const Eigen::Vector3i& start, const Fits& fits) {
     const auto first = static_cast<std::uint32_t>(index(start));
     distance_[first] = 0;
     buckets[0].push_back(first);
-    const auto width = static_cast<float>(voxel_);
+    const auto bucketOf = [width = static_cast<float>(voxel_)](float distance) {
+        return static_cast<std::size_t>(distance / width);
+    };
     const Eigen::Vector3i last = size_ - Eigen::Vector3i::Ones();
     for (std::size_t b = 0; b < buckets.size(); ++b) {
         const std::vector<std::uint32_t> now = std::move(buckets[b]);
         for (const std::uint32_t i : now) {
             const float d = distance_[i];
-            if (static_cast<std::size_t>(d / width) != b) {
+            if (bucketOf(d) != b) {
                 continue;  // a shorter way was found since
             }
             const Eigen::Vector3i v = coordinates(i);
             const bool border = (v.array() == 0).any() || (v.array() == last.array()).any();
-            for (const Step& s : steps) {
+            for (const std::uint8_t next : steps[step_[i]].next) {
+                const Step& s = steps[next];
                 if (border && !inside(v + s.offset)) {
                     continue;
                 }
                 const auto j = static_cast<std::uint32_t>(static_cast<std::ptrdiff_t>(i) + s.jump);
-                const bool clear = clear_[j] != 0;
-                if ((clear || fits) && d + s.length < distance_[j] && (clear || fitsAt(j, fits))) {
+                const float before = distance_[j];
+                if (d + s.length < before && (clear_[j] != 0 || fitsAt(j, fits))) {
                     distance_[j] = d + s.length;
-                    parent_[j] = i;
-                    const auto to = static_cast<std::size_t>(distance_[j] / width);
+                    step_[j] = next;
+                    const std::size_t to = bucketOf(distance_[j]);
+                    if (before < kFar && bucketOf(before) == to) {
+                        continue;  // is there
+                    }
                     if (buckets.size() <= to) {
                         buckets.resize(to + 1);
                     }
@@ -280,6 +298,7 @@ void FreeSpace::searchFrom(const Eigen::Vector3i& start, const Fits& fits) {
             }
         }
     }
+    std::replace(distance_.begin(), distance_.end(), kWall, kFar);
 }
 
 bool FreeSpace::knownAround(const Eigen::Vector3d& point, double radius, bool corners) const {
@@ -289,8 +308,8 @@ bool FreeSpace::knownAround(const Eigen::Vector3d& point, double radius, bool co
         return false;
     }
     const auto touchesSurface = [&](const Eigen::Vector3i& v) {
-        for (int i = 0; i < 27; ++i) {
-            const Eigen::Vector3i o(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
+        for (int i = 0; i < kAroundVoxel; ++i) {
+            const Eigen::Vector3i o = aroundVoxel(i);
             if ((corners || o.squaredNorm() == 1) && inside(v + o) &&
                 (voxels_[index(v + o)] & kSurfaceBit) != 0) {
                 return true;
@@ -380,11 +399,12 @@ std::vector<Eigen::Vector3d> FreeSpace::pathTo(const Eigen::Vector3d& goal) cons
         return {};
     }
     std::vector<Eigen::Vector3d> corners;
-    auto i = static_cast<std::uint32_t>(index(voxelOf(goal)));
-    for (; i != kNoParent; i = parent_[i]) {
-        corners.push_back(centre(coordinates(i)));
+    Eigen::Vector3i v = voxelOf(goal);
+    for (std::uint8_t step = step_[index(v)]; step != kNoStep; step = step_[index(v)]) {
+        corners.push_back(centre(v));
+        v -= aroundVoxel(step);
     }
-    corners.back() = start_;
+    corners.push_back(start_);
     std::reverse(corners.begin(), corners.end());
     std::vector<Eigen::Vector3d> path = {corners.front()};
     for (std::size_t at = 0; at + 1 < corners.size();) {

@@ -166,6 +166,30 @@ std::size_t indexInBlock(const Eigen::Vector3i& cell) {
     return static_cast<std::size_t>(row * n + cell.x());
 }
 
+/// SurfaceSummary::Block::emptyAround
+std::vector<std::uint8_t> emptyAround(const std::vector<std::uint64_t>& parts) {
+    std::vector<std::uint8_t> edges(parts.size(), 0);
+    for (int edge = 1; edge < SurfaceSummary::kCellsPerSide; edge *= 2) {
+        const int n = SurfaceSummary::kCellsPerSide / edge;
+        const auto forEachIn = [&](const Eigen::Vector3i& cube, const auto& f) {
+            for (int i = 0; i < edge * edge * edge; ++i) {
+                f(indexInBlock(edge * cube +
+                               Eigen::Vector3i(i % edge, i / edge % edge, i / edge / edge)));
+            }
+        };
+        for (int i = 0; i < n * n * n; ++i) {
+            const Eigen::Vector3i cube(i % n, i / n % n, i / n / n);
+            std::uint64_t held = 0;
+            forEachIn(cube, [&](std::size_t cell) { held |= parts[cell]; });
+            if (held == 0) {
+                forEachIn(cube,
+                          [&](std::size_t cell) { edges[cell] = static_cast<std::uint8_t>(edge); });
+            }
+        }
+    }
+    return edges;
+}
+
 double coarseIn(const SurfaceSummary::Block& block) {
     double area = 0;
     for (const SurfaceCell& cell : block.cells) {
@@ -204,9 +228,8 @@ std::uint64_t SurfaceSummary::keyAt(const Eigen::Vector3i& index) {
 std::array<std::uint64_t, 13> SurfaceSummary::neighbourOffsets() {
     std::array<std::uint64_t, 13> offsets{};
     const std::uint64_t middle = pack(Eigen::Vector3i::Zero());
-    for (int i = 0; i < 13; ++i) {
-        const int k = i + 14;  // the 27 of the cube in the order of their keys, from the middle on
-        offsets[static_cast<std::size_t>(i)] = pack({k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1}) - middle;
+    for (int i = 0; i < 13; ++i) {  // in the order of their keys, from the middle on
+        offsets[static_cast<std::size_t>(i)] = pack(aroundVoxel(i + 14)) - middle;
     }
     return offsets;
 }
@@ -265,23 +288,28 @@ bool SurfaceSummary::openTowards(const Eigen::Vector3f& place, const Eigen::Vect
     const Eigen::Array3f edges = (inverse > 0).select(scale * box_.max(), scale * box_.min());
     const float outside = ((edges - start.array()) * inverse).minCoeff();
     const float end = std::min({kParts * reach, way.norm(), outside});
+    Eigen::Vector3i at = Eigen::Vector3i::Constant(kOffset);  // of the block that the line is in
+    const Block* block = nullptr;
     for (float s = kFirst; s < end;) {
         const Eigen::Vector3f p = start + s * out;
         const Eigen::Vector3i part = p.unaryExpr([](float x) { return wholeBelow(x); });
-        const Block* block = blockAt(part.unaryExpr([](int x) { return x >> 5; }));
+        const Eigen::Vector3i now = part.unaryExpr([](int x) { return x >> 5; });
+        if (now != at) {
+            at = now;
+            block = blockAt(at);
+        }
         int empty = kParts * kCellsPerSide;  // [parts] edge of a cube here that holds nothing
         if (block != nullptr) {
             const Eigen::Vector3i cell = part.unaryExpr([](int x) { return x >> 2; });
-            const Eigen::Vector3i in = cell.unaryExpr([](int x) { return x & 7; });
-            const std::uint64_t held = block->parts[indexInBlock(in)];
-            if (held != 0) {
-                if ((held & partBit(part - kParts * cell)) != 0) {
+            const std::size_t in = indexInBlock(cell.unaryExpr([](int x) { return x & 7; }));
+            empty = kParts * block->emptyAround[in];
+            if (empty == 0) {
+                if ((block->parts[in] & partBit(part - kParts * cell)) != 0) {
                     return false;
                 }
                 s += kStep;
                 continue;
             }
-            empty = kParts;
         }
         // The last of these places that surely lies in that cube.
         const Eigen::Array3f low = part.unaryExpr([&](int x) { return x & -empty; }).cast<float>();
@@ -479,16 +507,20 @@ SurfaceSummary::Block SurfaceSummary::build(const PixelGraph& graph, std::uint64
                 if (s.vertices > 0) {
                     block.cells.push_back(
                         toCell(s, pack(corner + Eigen::Vector3i(x, y, z)), cell_));
-                    block.positions.push_back(block.cells.back().position);
                 }
             }
         }
     }
     if (!block.cells.empty()) {
+        block.positions.resize(static_cast<Eigen::Index>(block.cells.size()), 3);
+        for (std::size_t i = 0; i < block.cells.size(); ++i) {
+            block.positions.row(static_cast<Eigen::Index>(i)) = block.cells[i].position.transpose();
+        }
         block.parts.reserve(sums.size());
         for (const Sums& s : sums) {
             block.parts.push_back(s.vertices >= kLeastVertices ? s.parts : 0);
         }
+        block.emptyAround = emptyAround(block.parts);
     }
     return block;
 }

@@ -11,12 +11,6 @@ namespace riftmap {
 
 namespace {
 
-/// Offset of the i-th of a voxel and the 26 around it; the 13th is itself.
-Eigen::Vector3i around(int i) {
-    return {i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1};
-}
-
-constexpr int kAround = 27;
 constexpr int kPieceBits = 2;  ///< a piece of the frontier: 4 voxels along each axis
 
 }  // namespace
@@ -51,9 +45,9 @@ ThinShells::ThinShells(const FreeSpace& space, const SurfaceSummary& summary,
     for (const auto& piece : pieces) {
         constexpr int kLeast = 100;  // [backs] fewer may be a fold, and promise little
         Around all;
-        for (int i = 0; i < kAround; ++i) {
+        for (int i = 0; i < kAroundVoxel; ++i) {
             const auto it = pieces.find(
-                SurfaceSummary::keyAt(SurfaceSummary::indexOf(piece.first) + around(i)));
+                SurfaceSummary::keyAt(SurfaceSummary::indexOf(piece.first) + aroundVoxel(i)));
             if (it != pieces.end()) {
                 all += it->second;
             }
@@ -77,8 +71,8 @@ bool ThinShells::hold(const FreeSpace::Frontier& place) const {
 }
 
 bool ThinShells::touch(const Eigen::Vector3d& place) const {
-    for (int i = 0; i < kAround; ++i) {
-        if (inside_.contains(SurfaceSummary::keyAt(voxelOf(place) + around(i)))) {
+    for (int i = 0; i < kAroundVoxel; ++i) {
+        if (inside_.contains(SurfaceSummary::keyAt(voxelOf(place) + aroundVoxel(i)))) {
             return true;
         }
     }
@@ -105,10 +99,10 @@ ThinShells::Around ThinShells::lookAround(const FreeSpace& space,
         }
     }
     Around result;
-    std::array<std::uint64_t, kAround> met{};  // each piece of surface counts once
+    std::array<std::uint64_t, kAroundVoxel> met{};  // each piece of surface counts once
     std::size_t pieces = 0;
-    for (int i = 0; i < kAround && start; ++i) {
-        const Eigen::Vector3d way = around(i).cast<double>().normalized();
+    for (int i = 0; i < kAroundVoxel && start; ++i) {
+        const Eigen::Vector3d way = aroundVoxel(i).cast<double>().normalized();
         if (way.isZero()) {
             continue;
         }

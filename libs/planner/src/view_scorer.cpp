@@ -15,6 +15,7 @@ constexpr int kPixels = 12;  ///< of the image to one of the depth buffer, along
 constexpr int kRayStride = 2;
 constexpr double kMargin = 6;  ///< [px] a tear at the very border of the image stays torn
 constexpr float kFar = std::numeric_limits<float>::infinity();
+constexpr float kNearest = 0.05F;  ///< [m] before the camera: nothing nearer is drawn
 
 }  // namespace
 
@@ -31,25 +32,60 @@ struct ViewScorer::DepthBuffer {
         return depth[static_cast<std::size_t>(row) * static_cast<std::size_t>(width) +
                      static_cast<std::size_t>(column)];
     }
-    /// The nearest pixel, -1 for all that lie before the first: without a call of the library.
-    static int nearest(float x) { return static_cast<int>(std::clamp(x, -1.0F, 1e6F) + 1.5F) - 1; }
-    /// Draws a square that faces the camera; p in its frame, half the edge in metres.
-    void splat(const Eigen::Vector3f& p, float half) {
-        const float r = fx * half / p.z();
-        const float u = fx * p.x() / p.z() + cx;
-        const float v = fy * p.y() / p.z() + cy;
-        const int c0 = std::max(0, nearest(u - r));
-        const int c1 = std::min(width - 1, nearest(u + r));
-        const int r0 = std::max(0, nearest(v - r));
-        const int r1 = std::min(height - 1, nearest(v + r));
-        for (int row = r0; row <= r1; ++row) {
-            for (int column = c0; column <= c1; ++column) {
-                float& d = at(column, row);
-                d = std::min(d, p.z());
+    void splat(const Points& points, const Pose& camera_T_world, float half, double farLimit);
+};
+
+/// Draws squares that face the camera around points of the map within its range; half the edge in
+/// metres.
+void ViewScorer::DepthBuffer::splat(const Points& points, const Pose& camera_T_world, float half,
+                                    double farLimit) {
+    constexpr Eigen::Index kAtOnce = 128;  // so many at a time, in vector code
+    using Floats = Eigen::Array<float, Eigen::Dynamic, 1, 0, kAtOnce, 1>;
+    using Pixels = Eigen::Array<int, Eigen::Dynamic, 1, 0, kAtOnce, 1>;
+    const Eigen::Matrix3f rotation = camera_T_world.rotation.cast<float>();
+    const Eigen::Vector3f translation = camera_T_world.translation.cast<float>();
+    const auto most = static_cast<float>(farLimit);
+    for (Eigen::Index begin = 0; begin < points.rows(); begin += kAtOnce) {
+        const Eigen::Index n = std::min(kAtOnce, points.rows() - begin);
+        const auto some = points.middleRows(begin, n).array();
+        const auto along = [&](int axis) -> Floats {
+            return rotation(axis, 0) * some.col(0) + rotation(axis, 1) * some.col(1) +
+                   rotation(axis, 2) * some.col(2) + translation[axis];
+        };
+        const Floats z = along(2);
+        const Floats away = z.max(kNearest);
+        const Floats u = fx * along(0) / away + cx;
+        const Floats v = fy * along(1) / away + cy;
+        const Floats r = fx * half / away;
+        // The nearest pixel, counted from 1, 0 for all that lie before the first: without a call of
+        // the library.
+        const auto nearest = [&](const Floats& x) {
+            const Floats rounded = x.max(-1.0F).min(1e6F) + 1.5F;
+            Pixels pixels(n);
+            for (Eigen::Index i = 0; i < n; ++i) {
+                pixels[i] = static_cast<int>(rounded[i]);
+            }
+            return pixels;
+        };
+        const Pixels left = nearest(u - r);
+        const Pixels right = nearest(u + r);
+        const Pixels top = nearest(v - r);
+        const Pixels bottom = nearest(v + r);
+        for (Eigen::Index i = 0; i < n; ++i) {
+            if (!(z[i] >= kNearest && z[i] <= most)) {
+                continue;
+            }
+            const int lastColumn = std::min(width, right[i]);
+            const int lastRow = std::min(height, bottom[i]);
+            for (int row = std::max(1, top[i]); row <= lastRow; ++row) {
+                for (int column = std::max(1, left[i]); column <= lastColumn; ++column) {
+                    float& d = at(column - 1, row - 1);
+                    d = std::min(d, z[i]);
+                }
             }
         }
     }
-};
+}
 
 ViewScorer::ViewScorer(const SensorModel& sensor, const SurfaceSummary& summary,
                        const RiftLedger& ledger, const FreeSpace& space, double resolution,
@@ -205,7 +241,7 @@ ViewScorer::DepthBuffer ViewScorer::draw(const Pose& camera_T_world,
     const auto farLimit = static_cast<float>(sensor_.farLimit);
     const auto outOfSight = [&](const Eigen::Vector3f& centre, float radius) {
         const Eigen::Vector3f m = rotation * centre + translation;
-        const float z = std::max(m.z(), 0.05F);
+        const float z = std::max(m.z(), kNearest);
         const float spread = b.fx * radius / z;
         const float u = b.fx * m.x() / z + b.cx;
         const float v = b.fy * m.y() / z + b.cy;
@@ -226,12 +262,7 @@ ViewScorer::DepthBuffer ViewScorer::draw(const Pose& camera_T_world,
     }
     std::sort(seen.begin(), seen.end());  // in the blocks' own order
     for (const BlockView* block : seen) {
-        for (const Eigen::Vector3f& position : block->block->positions) {
-            const Eigen::Vector3f p = rotation * position + translation;
-            if (p.z() >= 0.05F && p.z() <= farLimit) {
-                b.splat(p, half);
-            }
-        }
+        b.splat(block->block->positions, camera_T_world, half, sensor_.farLimit);
     }
     return b;
 }
@@ -273,22 +304,30 @@ double ViewScorer::nearShareOf(const DepthBuffer& buffer) const {
     return static_cast<double>(nearPixels) / ((buffer.width - firstColumn) * buffer.height);
 }
 
-/// Within range, in the true field of view, and nothing drawn more than `slack` before it.
-bool ViewScorer::visible(const DepthBuffer& buffer, const Eigen::Vector3f& inCamera,
-                         float slack) const {
+/// Depth that is drawn where this place is in the image [m]; nothing if it is out of range or of
+/// the true field of view.
+std::optional<float> ViewScorer::drawnAt(const DepthBuffer& buffer,
+                                         const Eigen::Vector3f& inCamera) const {
     const Eigen::Vector3d p = inCamera.cast<double>();
     if (p.z() < std::max(1.02 * sensor_.nearLimit, 0.05) || p.z() > sensor_.farLimit) {
-        return false;
+        return std::nullopt;
     }
     const StereoCamera& camera = sensor_.camera;
     const Eigen::Vector2d uv = camera.project(p);
     if (uv.x() < sensor_.firstColumn + kMargin || uv.x() > camera.width - 1 - kMargin ||
         uv.y() < kMargin || uv.y() > camera.height - 1 - kMargin) {
-        return false;
+        return std::nullopt;
     }
     const int column = std::clamp(static_cast<int>(uv.x()) / kPixels, 0, buffer.width - 1);
     const int row = std::clamp(static_cast<int>(uv.y()) / kPixels, 0, buffer.height - 1);
-    return buffer.at(column, row) >= inCamera.z() - slack;
+    return buffer.at(column, row);
+}
+
+/// In the image, and nothing drawn more than `slack` before it.
+bool ViewScorer::visible(const DepthBuffer& buffer, const Eigen::Vector3f& inCamera,
+                         float slack) const {
+    const std::optional<float> drawn = drawnAt(buffer, inCamera);
+    return drawn && *drawn >= inCamera.z() - slack;
 }
 
 ViewScore ViewScorer::estimate(const Pose& world_T_camera) const {
@@ -354,6 +393,15 @@ std::vector<Eigen::Vector3d> ViewScorer::unknownSeen(const Pose& world_T_camera)
     return places;
 }
 
+void ViewScorer::setFrontier(std::vector<FreeSpace::Frontier> frontier, double edge) {
+    frontier_ = std::move(frontier);
+    frontierEdge_ = edge;
+    frontierCentres_.resize(static_cast<Eigen::Index>(frontier_.size()), 3);
+    for (std::size_t i = 0; i < frontier_.size(); ++i) {
+        frontierCentres_.row(static_cast<Eigen::Index>(i)) = frontier_[i].centre.transpose();
+    }
+}
+
 std::vector<float> ViewScorer::worth() const {
     std::vector<float> worth;
     worth.reserve(2 * (open_.size() + frontier_.size()));
@@ -401,14 +449,7 @@ ViewScorer::Seen ViewScorer::sightsAtMost(const Pose& world_T_camera) const {
     const Eigen::Matrix3f rotation = camera_T_world.rotation.cast<float>();
     const Eigen::Vector3f translation = camera_T_world.translation.cast<float>();
     const auto voxel = static_cast<float>(frontierEdge_);
-    std::vector<Eigen::Vector3f> places;
-    for (const FreeSpace::Frontier& f : frontier_) {
-        places.emplace_back(rotation * f.centre + translation);
-        if (places.back().z() > 0.05F &&
-            static_cast<double>(places.back().z()) < sensor_.farLimit) {
-            buffer.splat(places.back(), 0.5F * voxel);
-        }
-    }
+    buffer.splat(frontierCentres_, camera_T_world, 0.5F * voxel, sensor_.farLimit);
     const auto put = [&](std::size_t item, double share) {
         if (share > 0.02) {
             result.sights.push_back({static_cast<std::uint32_t>(item), static_cast<float>(share)});
@@ -421,9 +462,12 @@ ViewScorer::Seen ViewScorer::sightsAtMost(const Pose& world_T_camera) const {
             const Eigen::Vector3f p =
                 rotation * (cell.hidden > 0 ? cell.hiddenPosition : cell.openPosition) +
                 translation;
-            const bool drawn = visible(buffer, p, margin);
-            const bool byLine = weights_.gapsByLine && cell.hidden > 0;
-            if (drawn || (byLine && visible(buffer, p, kFar))) {
+            const std::optional<float> before = drawnAt(buffer, p);
+            if (!before) {
+                continue;
+            }
+            const bool drawn = *before >= p.z() - margin;
+            if (drawn || (weights_.gapsByLine && cell.hidden > 0)) {
                 const Benefit b = benefit(*open_[i], world_T_camera, false);
                 const std::size_t count = result.sights.size();
                 put(2 * i, b.torn);
@@ -436,13 +480,14 @@ ViewScorer::Seen ViewScorer::sightsAtMost(const Pose& world_T_camera) const {
     }
     const Eigen::Vector3f eye = world_T_camera.translation.cast<float>();
     for (std::size_t i = 0; i < frontier_.size(); ++i) {
-        if (!visible(buffer, places[i], 0.6F * voxel)) {
+        const Eigen::Vector3f p = rotation * frontier_[i].centre + translation;
+        if (!visible(buffer, p, 0.6F * voxel)) {
             continue;
         }
         const Eigen::Vector3f ray = (eye - frontier_[i].centre).normalized();
         const double facing = static_cast<double>(ray.dot(frontier_[i].area.normalized()));
         const double angle = std::clamp(2.0 * facing, 0.0, 1.0);
-        const auto z = static_cast<double>(places[i].z());
+        const auto z = static_cast<double>(p.z());
         const double afar = newSurfaceShare(z);
         put(2 * (open_.size() + i), angle * afar);
         put(2 * (open_.size() + i) + 1, angle * std::min(1.0, std::pow(goodDepth_ / z, 4)));

@@ -369,12 +369,25 @@ TEST(PixelGraph, NearestAndBoxAgreeWithBruteForce) {
     Scene scene = ground();
     scene.sphere({0, 0, 0.2}, 0.3);
     PixelGraph graph;
-    graph.merge(makeView(scene, smallCamera(), lookDown(0, 0, 1.5)));
+    Scene before = scene;
+    before.sphere({0.4, 0.3, 0.4}, 0.15);
+    scene.sphere({0.44, 0.3, 0.41}, 0.1);  // left of it: pages with vertices and with none
+    graph.merge(makeView(before, smallCamera(), lookDown(0, 0, 1.5)));
+    std::size_t deleted = 0;
+    for (int i = 0; i < 8; ++i) {
+        deleted +=
+            graph.merge(makeView(scene, smallCamera(), lookDown(0.01 * i, 0, 1.5))).deletedVertices;
+    }
+    EXPECT_GT(deleted, 50U);
     std::mt19937 random(7);
     std::uniform_real_distribution<float> in(-1.2F, 1.2F);
     for (int i = 0; i < 200; ++i) {
-        const Eigen::Vector3f p(in(random), in(random), 0.5F * in(random));
-        const float radius = 0.1F + 0.1F * in(random);
+        Eigen::Vector3f p(in(random), in(random), 0.5F * in(random));
+        float radius = 0.1F + 0.1F * in(random);
+        if (i % 2 == 0) {  // there
+            p = Eigen::Vector3f(0.3F, 0.3F, 0.45F) + 0.1F * p;
+            radius *= 0.25F;
+        }
         std::optional<VertexId> expected;
         float least = radius * radius;
         std::set<VertexId> inBox;

@@ -67,9 +67,10 @@ TEST_F(LedgerOnWall, whatIsCountedAlongTheWayIsWhatIsThere) {
         std::size_t open = 0;
         for (const auto& [key, block] : summary.blocks()) {
             cells += block.cells.size();
-            ASSERT_EQ(block.positions.size(), block.cells.size());
+            ASSERT_EQ(block.positions.rows(), static_cast<Eigen::Index>(block.cells.size()));
             for (std::size_t i = 0; i < block.cells.size(); ++i) {
-                EXPECT_EQ(block.positions[i], block.cells[i].position);
+                EXPECT_EQ(block.positions.row(static_cast<Eigen::Index>(i)).transpose(),
+                          block.cells[i].position);
                 coarse += static_cast<double>(block.cells[i].coarse);
             }
             std::uint64_t last = 0;

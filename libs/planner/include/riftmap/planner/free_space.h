@@ -13,6 +13,13 @@
 
 namespace riftmap {
 
+/// A voxel, the middle one, and the 26 around it.
+inline constexpr int kAroundVoxel = 27;
+/// Offset of the i-th of them from the middle; x goes first.
+inline Eigen::Vector3i aroundVoxel(int i) {
+    return {i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1};
+}
+
 /// What the pixels of a view without a match show, from FreeSpace::emptyPixels(); row by row.
 struct EmptyPixels {
     std::vector<float> depth;  ///< [m] before which there is nothing; 0: not known, or matched
@@ -199,9 +206,10 @@ class FreeSpace {
     Eigen::AlignedBox3d limits_;
     std::vector<std::uint8_t> clear_;  ///< 1 = the ball fits here
     std::size_t clearCount_ = 0;
-    std::vector<std::uint8_t> fits_;     ///< answers of `fits`: 0 not asked, 1 no, 2 yes
-    std::vector<float> distance_;        ///< from the start [m]
-    std::vector<std::uint32_t> parent_;  ///< voxel before it on the way
+    std::vector<std::uint8_t> fits_;  ///< answers of `fits`: 0 not asked, 1 no, 2 yes
+    std::vector<float> distance_;     ///< from the start [m]
+    static constexpr std::uint8_t kNoStep = kAroundVoxel / 2;
+    std::vector<std::uint8_t> step_;  ///< the last of the way, see aroundVoxel()
     Eigen::Vector3d start_ = Eigen::Vector3d::Zero();
 };
 

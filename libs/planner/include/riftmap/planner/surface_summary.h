@@ -68,11 +68,14 @@ class SurfaceSummary {
     struct Block {
         Eigen::AlignedBox3d box;         ///< of the cube of cells
         std::vector<SurfaceCell> cells;  ///< ascending in key
-        /// Their positions once more, side by side: all that drawing them takes.
-        std::vector<Eigen::Vector3f> positions;
+        /// Their positions once more, a row each: all that drawing them takes.
+        Eigen::Matrix<float, Eigen::Dynamic, 3> positions;
         /// SurfaceCell::parts of all its cubes with kLeastVertices, z by y by x; 0 for the
         /// others.
         std::vector<std::uint64_t> parts;
+        /// Of the same cubes, where `parts` has none: edge [cells] of the largest cube of 1, 2 or
+        /// 4 around each that holds none either, as they lie side by side; 0 for the others.
+        std::vector<std::uint8_t> emptyAround;
     };
     /// All blocks by key, in ascending order.
     const std::map<std::uint64_t, Block>& blocks() const { return blocks_; }

@@ -86,10 +86,7 @@ class ViewScorer {
     /// For the choice of several views at once: what there is to see as a list of items. For every
     /// open cell its tear and its coarse surface, for every place of the frontier the surface that
     /// may be there and its being known as well as asked.
-    void setFrontier(std::vector<FreeSpace::Frontier> frontier, double edge) {
-        frontier_ = std::move(frontier);
-        frontierEdge_ = edge;
-    }
+    void setFrontier(std::vector<FreeSpace::Frontier> frontier, double edge);
     const std::vector<FreeSpace::Frontier>& frontier() const { return frontier_; }
     /// Of every item [m^2].
     std::vector<float> worth() const;
@@ -136,12 +133,14 @@ class ViewScorer {
         std::vector<std::uint32_t> blocks;  ///< indices in blocks_
     };
     struct DepthBuffer;
+    using Points = decltype(SurfaceSummary::Block::positions);
 
     void groupBlocks();
     DepthBuffer draw(const Pose& camera_T_world, std::vector<const BlockView*>& seen) const;
     double newSurfaceShare(double distance) const;
     double besideRim(const SurfaceCell& cell) const;
     double nearShareOf(const DepthBuffer& buffer) const;
+    std::optional<float> drawnAt(const DepthBuffer& buffer, const Eigen::Vector3f& inCamera) const;
     bool visible(const DepthBuffer& buffer, const Eigen::Vector3f& inCamera, float slack) const;
     bool openTo(const SurfaceCell& cell, const Pose& world_T_camera) const;
     template <class F>
@@ -159,6 +158,7 @@ class ViewScorer {
     std::vector<Group> groups_;
     std::vector<const RiftRecord*> open_;  ///< by block, then key
     std::vector<FreeSpace::Frontier> frontier_;
+    Points frontierCentres_;
     double frontierEdge_ = 0;  ///< of its voxels [m]
 };
 
