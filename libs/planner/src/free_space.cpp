@@ -13,7 +13,6 @@ namespace riftmap {
 namespace {
 
 constexpr float kFar = std::numeric_limits<float>::infinity();
-constexpr float kWall = -1;  ///< less than any distance: no way is sought
 const std::array<Eigen::Vector3i, 6> kFaces = {Eigen::Vector3i(1, 0, 0), Eigen::Vector3i(-1, 0, 0),
                                                Eigen::Vector3i(0, 1, 0), Eigen::Vector3i(0, -1, 0),
                                                Eigen::Vector3i(0, 0, 1), Eigen::Vector3i(0, 0, -1)};
@@ -230,40 +229,39 @@ bool FreeSpace::fitsAt(std::size_t voxel, const Fits& fits) {
 }
 
 void FreeSpace::searchFrom(const Eigen::Vector3i& start, const Fits& fits) {
-    distance_.resize(voxels_.size());
-    for (std::size_t i = 0; i < voxels_.size(); ++i) {
-        distance_[i] = clear_[i] != 0 || fits ? kFar : kWall;
-    }
+    distance_.assign(voxels_.size(), kFar);
     step_.assign(voxels_.size(), kNoStep);
     struct Step {
         Eigen::Vector3i offset;
         std::ptrdiff_t jump = 0;  ///< in the array
         float length = 0;
         /// What may follow it on a shortest way: steps to voxels that do not touch the one it comes
-        /// from, for that one reaches those sooner.
+        /// from. That one reaches the others sooner by itself: whether a voxel may be entered does
+        /// not depend on where from.
         std::vector<std::uint8_t> next;
     };
-    std::array<Step, kAroundVoxel> steps;
-    for (std::uint8_t i = 0; i < kAroundVoxel; ++i) {
+    std::array<Step, kCubeOfVoxels> steps;
+    for (std::uint8_t i = 0; i < kCubeOfVoxels; ++i) {
         const Eigen::Vector3i o = aroundVoxel(i);
         Step& s = steps.at(i);
         s.offset = o;
         s.jump = (static_cast<std::ptrdiff_t>(o.z()) * size_.y() + o.y()) * size_.x() + o.x();
         s.length = static_cast<float>(o.cast<double>().norm() * voxel_);
-        for (std::uint8_t next = 0; next < kAroundVoxel; ++next) {
+        for (std::uint8_t next = 0; next < kCubeOfVoxels; ++next) {
             const Eigen::Vector3i both = o + aroundVoxel(next);
             if (next != kNoStep && (i == kNoStep || both.cwiseAbs().maxCoeff() > 1)) {
                 s.next.push_back(next);
             }
         }
     }
-    // No step is shorter than a voxel, so voxels whose distances share a bucket of that width
-    // cannot shorten each other's way: their order is free.
+    // No step is shorter than a voxel, so voxels whose distances share a bucket that is narrower
+    // cannot shorten each other's way: their order is free. (A bucket as wide as a voxel may hold
+    // both ends of a step, by rounding.)
     std::vector<std::vector<std::uint32_t>> buckets(1);
     const auto first = static_cast<std::uint32_t>(index(start));
     distance_[first] = 0;
     buckets[0].push_back(first);
-    const auto bucketOf = [width = static_cast<float>(voxel_)](float distance) {
+    const auto bucketOf = [width = 0.99F * static_cast<float>(voxel_)](float distance) {
         return static_cast<std::size_t>(distance / width);
     };
     const Eigen::Vector3i last = size_ - Eigen::Vector3i::Ones();
@@ -283,7 +281,7 @@ void FreeSpace::searchFrom(const Eigen::Vector3i& start, const Fits& fits) {
                 }
                 const auto j = static_cast<std::uint32_t>(static_cast<std::ptrdiff_t>(i) + s.jump);
                 const float before = distance_[j];
-                if (d + s.length < before && (clear_[j] != 0 || fitsAt(j, fits))) {
+                if (d + s.length < before && (clear_[j] != 0 || (fits && fitsAt(j, fits)))) {
                     distance_[j] = d + s.length;
                     step_[j] = next;
                     const std::size_t to = bucketOf(distance_[j]);
@@ -298,7 +296,6 @@ void FreeSpace::searchFrom(const Eigen::Vector3i& start, const Fits& fits) {
             }
         }
     }
-    std::replace(distance_.begin(), distance_.end(), kWall, kFar);
 }
 
 bool FreeSpace::knownAround(const Eigen::Vector3d& point, double radius, bool corners) const {
@@ -308,7 +305,7 @@ bool FreeSpace::knownAround(const Eigen::Vector3d& point, double radius, bool co
         return false;
     }
     const auto touchesSurface = [&](const Eigen::Vector3i& v) {
-        for (int i = 0; i < kAroundVoxel; ++i) {
+        for (int i = 0; i < kCubeOfVoxels; ++i) {
             const Eigen::Vector3i o = aroundVoxel(i);
             if ((corners || o.squaredNorm() == 1) && inside(v + o) &&
                 (voxels_[index(v + o)] & kSurfaceBit) != 0) {

@@ -45,7 +45,7 @@ ThinShells::ThinShells(const FreeSpace& space, const SurfaceSummary& summary,
     for (const auto& piece : pieces) {
         constexpr int kLeast = 100;  // [backs] fewer may be a fold, and promise little
         Around all;
-        for (int i = 0; i < kAroundVoxel; ++i) {
+        for (int i = 0; i < kCubeOfVoxels; ++i) {
             const auto it = pieces.find(
                 SurfaceSummary::keyAt(SurfaceSummary::indexOf(piece.first) + aroundVoxel(i)));
             if (it != pieces.end()) {
@@ -71,7 +71,7 @@ bool ThinShells::hold(const FreeSpace::Frontier& place) const {
 }
 
 bool ThinShells::touch(const Eigen::Vector3d& place) const {
-    for (int i = 0; i < kAroundVoxel; ++i) {
+    for (int i = 0; i < kCubeOfVoxels; ++i) {
         if (inside_.contains(SurfaceSummary::keyAt(voxelOf(place) + aroundVoxel(i)))) {
             return true;
         }
@@ -99,9 +99,9 @@ ThinShells::Around ThinShells::lookAround(const FreeSpace& space,
         }
     }
     Around result;
-    std::array<std::uint64_t, kAroundVoxel> met{};  // each piece of surface counts once
+    std::array<std::uint64_t, kCubeOfVoxels> met{};  // each piece of surface counts once
     std::size_t pieces = 0;
-    for (int i = 0; i < kAroundVoxel && start; ++i) {
+    for (int i = 0; i < kCubeOfVoxels && start; ++i) {
         const Eigen::Vector3d way = aroundVoxel(i).cast<double>().normalized();
         if (way.isZero()) {
             continue;

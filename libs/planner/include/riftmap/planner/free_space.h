@@ -13,9 +13,9 @@
 
 namespace riftmap {
 
-/// A voxel, the middle one, and the 26 around it.
-inline constexpr int kAroundVoxel = 27;
-/// Offset of the i-th of them from the middle; x goes first.
+/// Voxels of a cube of three along each edge.
+inline constexpr int kCubeOfVoxels = 27;
+/// Offset of the i-th of them from the middle one, which is the 13th; x goes first.
 inline Eigen::Vector3i aroundVoxel(int i) {
     return {i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1};
 }
@@ -154,7 +154,8 @@ class FreeSpace {
     /// and measured at every pixel.
     static constexpr std::uint8_t kProvenBit = 16;
     static constexpr std::uint8_t kMiddleBit = 32;  ///< known by what was measured at its centre
-    static constexpr int kTryShift = 6;             ///< count of vain tries in the upper bits
+    static constexpr std::uint8_t kNoStep = kCubeOfVoxels / 2;
+    static constexpr int kTryShift = 6;  ///< count of vain tries in the upper bits
 
     bool inside(const Eigen::Vector3i& v) const {
         return (v.array() >= 0).all() && (v.array() < size_.array()).all();
@@ -208,8 +209,9 @@ class FreeSpace {
     std::size_t clearCount_ = 0;
     std::vector<std::uint8_t> fits_;  ///< answers of `fits`: 0 not asked, 1 no, 2 yes
     std::vector<float> distance_;     ///< from the start [m]
-    static constexpr std::uint8_t kNoStep = kAroundVoxel / 2;
-    std::vector<std::uint8_t> step_;  ///< the last of the way, see aroundVoxel()
+    /// Of the way to each voxel the last step, an index of aroundVoxel(); kNoStep at the start and
+    /// where no way leads.
+    std::vector<std::uint8_t> step_;
     Eigen::Vector3d start_ = Eigen::Vector3d::Zero();
 };
 
