@@ -17,7 +17,7 @@ inline float squaredDistance(const Page& page, std::uint32_t slot, const Eigen::
     return dx * dx + dy * dy + dz * dz;
 }
 
-/// The living vertices whose squaredDistance() is at most `limit`, a bit a slot.
-std::uint64_t verticesWithin(const Page& page, const Eigen::Vector3f& point, float limit);
+/// The living vertices whose squaredDistance() is at most `squaredLimit` [m^2], a bit a slot.
+std::uint64_t verticesWithin(const Page& page, const Eigen::Vector3f& point, float squaredLimit);
 
 }  // namespace riftmap

@@ -11,6 +11,8 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
+#include "slot_bits-inl.h"
+
 HWY_BEFORE_NAMESPACE();
 namespace riftmap::HWY_NAMESPACE {
 namespace {
@@ -37,11 +39,6 @@ HWY_INLINE M slotMask(std::uint64_t slots, std::uint32_t first) {
     const auto bits = static_cast<std::uint32_t>((slots >> first) & 0xFFFFU);
     return hn::RebindMask(
         d, hn::TestBit(hn::Set(du, bits), hn::Shl(hn::Set(du, 1U), hn::Iota(du, 0U))));
-}
-HWY_INLINE std::uint64_t slotBits(M mask, std::uint32_t first) {
-    std::array<std::uint8_t, 8> bytes{};
-    hn::StoreMaskBits(d, mask, bytes.data());
-    return std::uint64_t{unsigned{bytes[0]} | (unsigned{bytes[1]} << 8U)} << first;
 }
 
 /// A direction a lane.
@@ -253,7 +250,7 @@ HWY_INLINE Place fusePlaces(const ViewPoints& view, const Fuser& fuser, M there,
     const M noisy = hn::Gt(fuser.sigma_, hn::Mul(set(kNoisy), spacing));
     const V length = hn::Sqrt(hn::Add(hn::Mul(dx, dx), hn::Add(hn::Mul(dy, dy), hn::Mul(dz, dz))));
     const M far = hn::Gt(length, hn::Mul(set(0.02F), spacing));
-    fusion.moved |= slotBits(hn::And(there, hn::AndNot(noisy, far)), slot);
+    fusion.moved |= slotBits(d, hn::And(there, hn::AndNot(noisy, far)), slot);
     const M renew =
         hn::And(hn::And(there, noisy), hn::RebindMask(d, has(look, ViewPoints::kOnPatch)));
     if (hn::AllFalse(d, renew)) {
@@ -337,7 +334,7 @@ void fuseOf(const ViewPoints& view, Page& page, PageFusion& fusion) {
         if (hn::AllFalse(d, there)) {
             continue;
         }
-        fusion.matched |= slotBits(there, slot);
+        fusion.matched |= slotBits(d, there, slot);
         pixel = hn::IfThenElseZero(hn::RebindMask(du, there), pixel);
         const VI at = hn::BitCast(di, pixel);
         Place place{hn::LoadU(d, fusion.before + slot), hn::AndNot(there, there)};

@@ -11,6 +11,7 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
+#include "slot_bits-inl.h"
 #include "vector_tail-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -95,9 +96,7 @@ void projectOf(const Page& page, const Projection& in, ProjectedPage& out) {
         const auto seenInt = hn::RebindMask(di, seen);
         first = hn::IfThenElse(seenInt, hn::Min(first, row), first);
         last = hn::IfThenElse(seenInt, hn::Max(last, row), last);
-        std::array<std::uint8_t, 8> mask{};
-        hn::StoreMaskBits(d, seen, mask.data());
-        out.inView |= std::uint64_t{unsigned{mask[0]} | (unsigned{mask[1]} << 8U)} << slot;
+        out.inView |= slotBits(d, seen, slot);
     }
     out.firstRow = hn::GetLane(hn::MinOfLanes(di, first));
     out.lastRow = hn::GetLane(hn::MaxOfLanes(di, last));

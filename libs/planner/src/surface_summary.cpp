@@ -288,7 +288,8 @@ bool SurfaceSummary::openTowards(const Eigen::Vector3f& place, const Eigen::Vect
     const Eigen::Array3f edges = (inverse > 0).select(scale * box_.max(), scale * box_.min());
     const float outside = ((edges - start.array()) * inverse).minCoeff();
     const float end = std::min({kParts * reach, way.norm(), outside});
-    Eigen::Vector3i at = Eigen::Vector3i::Constant(kOffset);  // of the block that the line is in
+    // The block that the line is in; none was looked for yet.
+    Eigen::Vector3i at = Eigen::Vector3i::Constant(kOffset);
     const Block* block = nullptr;
     for (float s = kFirst; s < end;) {
         const Eigen::Vector3f p = start + s * out;

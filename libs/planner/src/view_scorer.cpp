@@ -40,17 +40,19 @@ struct ViewScorer::DepthBuffer {
 void ViewScorer::DepthBuffer::splat(const Points& points, const Pose& camera_T_world, float half,
                                     double farLimit) {
     constexpr Eigen::Index kAtOnce = 128;  // so many at a time, in vector code
-    using Floats = Eigen::Array<float, Eigen::Dynamic, 1, 0, kAtOnce, 1>;
-    using Pixels = Eigen::Array<int, Eigen::Dynamic, 1, 0, kAtOnce, 1>;
+    using Floats = Eigen::Array<float, Eigen::Dynamic, 1, Eigen::ColMajor, kAtOnce, 1>;
+    using Pixels = Eigen::Array<int, Eigen::Dynamic, 1, Eigen::ColMajor, kAtOnce, 1>;
     const Eigen::Matrix3f rotation = camera_T_world.rotation.cast<float>();
     const Eigen::Vector3f translation = camera_T_world.translation.cast<float>();
     const auto most = static_cast<float>(farLimit);
     for (Eigen::Index begin = 0; begin < points.rows(); begin += kAtOnce) {
         const Eigen::Index n = std::min(kAtOnce, points.rows() - begin);
         const auto some = points.middleRows(begin, n).array();
+        // In the order in which Eigen multiplies a matrix with one vector, for the same bits.
         const auto along = [&](int axis) -> Floats {
-            return rotation(axis, 0) * some.col(0) + rotation(axis, 1) * some.col(1) +
-                   rotation(axis, 2) * some.col(2) + translation[axis];
+            return rotation(axis, 0) * some.col(0) +
+                   (rotation(axis, 1) * some.col(1) + rotation(axis, 2) * some.col(2)) +
+                   translation[axis];
         };
         const Floats z = along(2);
         const Floats away = z.max(kNearest);
@@ -309,7 +311,8 @@ double ViewScorer::nearShareOf(const DepthBuffer& buffer) const {
 std::optional<float> ViewScorer::drawnAt(const DepthBuffer& buffer,
                                          const Eigen::Vector3f& inCamera) const {
     const Eigen::Vector3d p = inCamera.cast<double>();
-    if (p.z() < std::max(1.02 * sensor_.nearLimit, 0.05) || p.z() > sensor_.farLimit) {
+    constexpr auto kLeast = static_cast<double>(kNearest);
+    if (p.z() < std::max(1.02 * sensor_.nearLimit, kLeast) || p.z() > sensor_.farLimit) {
         return std::nullopt;
     }
     const StereoCamera& camera = sensor_.camera;
@@ -326,8 +329,8 @@ std::optional<float> ViewScorer::drawnAt(const DepthBuffer& buffer,
 /// In the image, and nothing drawn more than `slack` before it.
 bool ViewScorer::visible(const DepthBuffer& buffer, const Eigen::Vector3f& inCamera,
                          float slack) const {
-    const std::optional<float> drawn = drawnAt(buffer, inCamera);
-    return drawn && *drawn >= inCamera.z() - slack;
+    const std::optional<float> depth = drawnAt(buffer, inCamera);
+    return depth && *depth >= inCamera.z() - slack;
 }
 
 ViewScore ViewScorer::estimate(const Pose& world_T_camera) const {
@@ -462,19 +465,19 @@ ViewScorer::Seen ViewScorer::sightsAtMost(const Pose& world_T_camera) const {
             const Eigen::Vector3f p =
                 rotation * (cell.hidden > 0 ? cell.hiddenPosition : cell.openPosition) +
                 translation;
-            const std::optional<float> before = drawnAt(buffer, p);
-            if (!before) {
+            const std::optional<float> depth = drawnAt(buffer, p);
+            if (!depth) {
                 continue;
             }
-            const bool drawn = *before >= p.z() - margin;
-            if (drawn || (weights_.gapsByLine && cell.hidden > 0)) {
+            const bool inSight = *depth >= p.z() - margin;
+            if (inSight || (weights_.gapsByLine && cell.hidden > 0)) {
                 const Benefit b = benefit(*open_[i], world_T_camera, false);
                 const std::size_t count = result.sights.size();
                 put(2 * i, b.torn);
                 if (cell.hidden > 0 && result.sights.size() > count) {
                     result.gaps.push_back(static_cast<std::uint32_t>(count));
                 }
-                put(2 * i + 1, drawn ? b.coarse : 0.0);
+                put(2 * i + 1, inSight ? b.coarse : 0.0);
             }
         }
     }

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What planning costs, whole and by part: around an object and in a room, exact depth, the views
-// that the planner takes. bench-planner --csv FILE
+// What planning costs on exact depth, around an object and in a room: whole plans of the views that
+// the planner takes (all threads), and parts of one halfway (one thread). bench-planner --csv FILE
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <fstream>
 #include <functional>
+#include <random>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "riftmap/planner/surface_explorer.h"
@@ -26,24 +26,19 @@ double milliseconds(const std::function<void()>& work) {
         .count();
 }
 
-double share(std::vector<double> values, double part) {
-    std::sort(values.begin(), values.end());
-    return values.empty()
-               ? std::nan("")
-               : values[static_cast<std::size_t>(part * static_cast<double>(values.size() - 1))];
-}
-
 struct Scene {
     std::string name;
-    SimulationOptions simulation;
-    GraphOptions graph;
-    PlannerOptions planner;
-    int views = 0;
+    bool aroundObject = false;
+    SimulationOptions simulation = {};
+    GraphOptions graph = {};
+    PlannerOptions planner = {};
+    std::size_t views = 0;
 };
 
 /// As config/explore-object.ini has it, with the sculpture.
 Scene object() {
-    Scene scene{"object", {}, {}, {}, 12};
+    Scene scene{"object", true};
+    scene.views = 12;
     scene.simulation.world.name = WorldOptions::Name::kSculpture;
     scene.graph.targetResolution = 0.005;
     scene.graph.gamma = 0.003;
@@ -55,106 +50,133 @@ Scene object() {
 
 /// As config/explore-room.ini has it.
 Scene room() {
-    Scene scene{"room", {}, {}, {}, 40};
+    Scene scene{"room", false};
+    scene.views = 40;
     scene.simulation.world.name = WorldOptions::Name::kRoom;
     scene.graph.targetResolution = 0.02;
     scene.planner.viewCost = 6;
     return scene;
 }
 
-/// Times of the parts of a plan, all of one map.
-struct Parts {
-    std::vector<double> ways, sights, lines;  ///< [ms] a search; [us] a view; [us] a line
+/// A figure of which a run gives many values.
+struct Times {
+    std::string name, unit;
+    std::vector<double> values;
 };
 
-/// Looks at what is known from the views that the run has taken and from places around them.
-void measureParts(const Knowledge& knowledge, const std::vector<Pose>& poses, Parts& parts) {
-    FreeSpace space = knowledge.space();
-    for (int i = 0; i < 5; ++i) {
-        parts.ways.push_back(
-            milliseconds([&] { space.updateReach(knowledge.camera().translation); }));
+/// Views of the object from all sides and distances, or from anywhere to anywhere in the room.
+std::vector<Pose> candidates(const Knowledge& known) {
+    constexpr int kCandidates = 200;
+    std::mt19937 random(1);
+    const auto uniform = [&] { return static_cast<double>(random()) / 4294967296.0; };
+    std::vector<Eigen::Vector3d> eyes = known.space().reachable(2);
+    std::vector<Pose> poses;
+    for (int i = 0; i < kCandidates; ++i) {
+        const Eigen::Vector3d eye = eyes[random() % eyes.size()];
+        const Eigen::Vector3d any = eye + Eigen::Vector3d(uniform() - 0.5, uniform() - 0.5, 0);
+        poses.push_back(known.sensor().lookingAt(
+            eye, known.surfaceBox() ? Eigen::Vector3d(known.surfaceBox()->center()) : any));
     }
-    ViewScorer::Weights weights;
-    weights.gapsByLine = knowledge.surfaceBox().has_value();
-    ViewScorer scorer(knowledge.sensor(), knowledge.summary(), knowledge.ledger(),
-                      knowledge.space(), knowledge.resolution(), weights);
-    if (knowledge.surfaceBox()) {
-        scorer.setFrontier(knowledge.unseen().frontier(*knowledge.surfaceBox()),
-                           knowledge.unseen().voxelSize());
-    }
-    for (const Pose& pose : poses) {
-        if (!knowledge.surfaceBox()) {
-            parts.sights.push_back(1000 * milliseconds([&] { scorer.score(pose); }));
-            continue;
-        }
-        ViewScorer::Seen seen;
-        parts.sights.push_back(1000 * milliseconds([&] { seen = scorer.sightsAtMost(pose); }));
-        const auto lines = static_cast<double>(seen.gaps.size());
-        const double whole = milliseconds([&] { scorer.dropHidden(seen.sights, seen.gaps, pose); });
-        if (lines > 0) {
-            parts.lines.push_back(1000 * whole / lines);
-        }
-    }
+    return poses;
 }
 
-void measure(const Scene& scene, std::ofstream& csv) {
-    SimulationOptions simulation = scene.simulation;
-    simulation.noise.level = NoiseOptions::Level::kN0;
-    const bool isObject = scene.name == "object";
-    SimulatedPlatform platform(simulation, 0);
-    PlannerOptions planner = scene.planner;
-    if (isObject) {
-        const Bounds box = bounds(platform.world().mesh);
-        const Eigen::Vector3d low = box.min.array() - 0.03;
-        const Eigen::Vector3d high = box.max.array() + 0.03;
-        planner.surfaceBox = {low.x(), low.y(), low.z(), high.x(), high.y(), high.z()};
+/// Parts of a plan: the search for ways (without passages), and of each candidate what is drawn and
+/// weighed, around an object without and with the lines out of gaps.
+std::vector<Times> partsOf(const Knowledge& known) {
+    Times ways{"ways", "ms", {}};
+    FreeSpace space = known.space();
+    for (int i = 0; i < 15; ++i) {
+        ways.values.push_back(milliseconds([&] { space.updateReach(known.camera().translation); }));
+    }
+    ViewScorer::Weights weights;
+    weights.gapsByLine = known.surfaceBox().has_value();
+    ViewScorer scorer(known.sensor(), known.summary(), known.ledger(), known.space(),
+                      known.resolution(), weights);
+    Times score{"score", "us", {}};
+    if (!known.surfaceBox()) {
+        for (const Pose& pose : candidates(known)) {
+            score.values.push_back(1000 * milliseconds([&] { scorer.score(pose); }));
+        }
+        return {ways, score};
+    }
+    scorer.setFrontier(known.unseen().frontier(*known.surfaceBox()), known.unseen().voxelSize());
+    Times sights{"sights", "us", {}};
+    Times line{"line", "us", {}};
+    for (const Pose& pose : candidates(known)) {
+        ViewScorer::Seen seen;
+        sights.values.push_back(1000 * milliseconds([&] { seen = scorer.sightsAtMost(pose); }));
+        const auto lines = static_cast<double>(seen.gaps.size());
+        const double all = milliseconds([&] { scorer.dropHidden(seen.sights, seen.gaps, pose); });
+        if (lines > 0) {
+            line.values.push_back(1000 * all / lines);
+        }
+    }
+    return {ways, sights, line};
+}
+
+/// The object's box, with the margin that riftmap-explore leaves.
+std::vector<double> boxAround(const TriangleMesh& mesh) {
+    const Bounds box = bounds(mesh);
+    const double margin = 0.02 * box.size().maxCoeff() + 0.01;
+    const Eigen::Vector3d low = box.min.array() - margin;
+    const Eigen::Vector3d high = box.max.array() + margin;
+    return {low.x(), low.y(), low.z(), high.x(), high.y(), high.z()};
+}
+
+std::vector<Times> measure(Scene scene) {
+    scene.simulation.noise.level = NoiseOptions::Level::kN0;
+    SimulatedPlatform platform(scene.simulation, 0);
+    if (scene.aroundObject) {
+        scene.planner.surfaceBox = boxAround(platform.world().mesh);
     }
     PixelGraph graph(scene.graph);
     ViewBuilder builder{StereoOptions{}};
-    RiftPlanner rifts;
+    RiftPlanner planner;
     StopOptions stop;
-    stop.maxViews = scene.views;
-    std::vector<double> knowledge, plan;
-    std::vector<Pose> poses;
-    Parts parts;
+    stop.maxViews = static_cast<int>(scene.views);
+    Times plan{"plan", "ms", {}};            // with `knowledge` of the view before
+    Times knowledge{"knowledge", "ms", {}};  // what a view changes
+    std::vector<Times> parts;
     SurfaceExplorer explorer(
-        platform, graph, rifts, planner, stop,
+        platform, graph, planner, scene.planner, stop,
         [&](const StereoObservation& o) { return builder.build(o); }, {},
         [&](const ExploreStep& step, const Knowledge& known) {
-            poses.push_back(known.camera());
-            knowledge.push_back(step.knowledgeMs);
+            knowledge.values.push_back(step.knowledgeMs);
             if (step.planMs > 0) {
-                plan.push_back(step.planMs);
+                plan.values.push_back(step.planMs);
             }
-            if (static_cast<int>(poses.size()) == scene.views / 2) {
-                measureParts(known, poses, parts);
+            if (knowledge.values.size() == scene.views / 2) {
+                parts = partsOf(known);
             }
         });
     explorer.run(false);
-    const auto add = [&](const std::string& name, const std::vector<double>& values,
-                         const char* unit) {
-        if (values.empty()) {
-            return;
-        }
-        for (const auto& [part, suffix] : {std::pair(0.5, "median"), std::pair(0.95, "p95")}) {
-            const std::string figure = scene.name + "_" + name + "_" + suffix;
-            csv << figure << ',' << share(values, part) << ',' << unit << '\n';
-            std::printf("%-32s %8.3f %s\n", figure.c_str(), share(values, part), unit);
-        }
-    };
-    add("plan", plan, "ms");            // with the next one
-    add("knowledge", knowledge, "ms");  // after a view
-    add("ways", parts.ways, "ms");
-    add(isObject ? "sights" : "score", parts.sights, "us");  // of a candidate
-    add("line", parts.lines, "us");                          // out of a gap, to the camera
+    parts.insert(parts.begin(), {plan, knowledge});
+    return parts;
 }
 
 int run(const std::string& file) {
     std::ofstream csv(file);
-    csv << "figure,value,unit\n";
-    measure(object(), csv);
-    measure(room(), csv);
+    csv << "figure,value,unit\n" << std::flush;  // before minutes are spent
+    for (const Scene& scene : {object(), room()}) {
+        if (!csv) {
+            break;
+        }
+        for (Times& t : measure(scene)) {
+            std::sort(t.values.begin(), t.values.end());
+            for (const int percent : {50, 95}) {
+                const std::string figure =
+                    scene.name + "_" + t.name + "_p" + std::to_string(percent);
+                const std::size_t at = (t.values.size() - 1) * static_cast<std::size_t>(percent);
+                const double value = t.values.at(at / 100);
+                csv << figure << ',' << value << ',' << t.unit << '\n';
+                std::printf("%-24s %8.3f %s\n", figure.c_str(), value, t.unit.c_str());
+            }
+        }
+    }
     csv.close();
+    if (!csv) {
+        std::fprintf(stderr, "bench-planner: cannot write %s\n", file.c_str());
+    }
     return csv ? 0 : 1;
 }
 

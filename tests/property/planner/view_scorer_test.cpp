@@ -71,17 +71,19 @@ class SlowSight {
           cell_(watched.summary.cellSize()) {
         for (const auto& [key, block] : watched.summary.blocks()) {
             for (const SurfaceCell& cell : block.cells) {
-                const Eigen::Vector3d p =
-                    camera_T_world_ * Eigen::Vector3d(cell.position.cast<double>());
-                if (p.z() > 0.05 && p.z() < sensor_.farLimit) {
-                    squares_.push_back(p);
-                }
+                put(inCamera(cell.position), 0.6 * cell_);
             }
         }
     }
+    void put(const FreeSpace::Frontier& place, double edge) {
+        put(inCamera(place.centre), 0.5 * edge);
+    }
 
-    Sight of(const SurfaceCell& cell) const {
-        const Eigen::Vector3d p = inCamera(cell.openPosition);
+    Sight of(const SurfaceCell& cell) const { return at(cell.openPosition, 2 * cell_); }
+
+    /// Unless something stands more than `slack` before it.
+    Sight at(const Eigen::Vector3f& place, double slack) const {
+        const Eigen::Vector3d p = inCamera(place);
         const double inside = insideBy(p);
         if (inside < -kDoubt || p.z() <= 0) {
             return Sight::kNo;
@@ -90,8 +92,8 @@ class SlowSight {
         const double column = uv.x() / kPixels;
         const double row = uv.y() / kPixels;
         bool doubt = inside < kDoubt || nearWhole(column) || nearWhole(row);
-        for (const Eigen::Vector3d& square : squares_) {
-            const double before = p.z() - 2 * cell_ - square.z();
+        for (const auto& square : squares_) {
+            const double before = p.z() - slack - square.centre.z();
             const Sight covers = hides(square, std::floor(column), std::floor(row));
             if (before > kDoubt && covers == Sight::kYes && !doubt) {
                 return Sight::kNo;
@@ -131,12 +133,23 @@ class SlowSight {
 
     static bool nearWhole(double x) { return std::abs(x - std::round(x)) < kDoubt; }
 
-    /// Whether the square of a cell, 1.2 cells wide, reaches over the middle of a pixel.
-    Sight hides(const Eigen::Vector3d& square, double column, double row) const {
+    struct Square {
+        Eigen::Vector3d centre;  ///< in the camera's frame
+        double half;             ///< edge [m]
+    };
+    void put(const Eigen::Vector3d& inCamera, double half) {
+        if (inCamera.z() > 0.05 && inCamera.z() < sensor_.farLimit) {
+            squares_.push_back({inCamera, half});
+        }
+    }
+
+    /// Whether a square reaches over the middle of a pixel.
+    Sight hides(const Square& square, double column, double row) const {
         const StereoCamera& c = sensor_.camera;
-        const double half = c.fx / kPixels * 0.6 * cell_ / square.z();
-        const double u = c.fx / kPixels * square.x() / square.z() + (c.cx + 0.5) / kPixels - 0.5;
-        const double v = c.fy / kPixels * square.y() / square.z() + (c.cy + 0.5) / kPixels - 0.5;
+        const Eigen::Vector3d& p = square.centre;
+        const double half = c.fx / kPixels * square.half / p.z();
+        const double u = c.fx / kPixels * p.x() / p.z() + (c.cx + 0.5) / kPixels - 0.5;
+        const double v = c.fy / kPixels * p.y() / p.z() + (c.cy + 0.5) / kPixels - 0.5;
         // Ends count to the pixel that they are in, so half a pixel more.
         const double over = half + 0.5 - std::max(std::abs(u - column), std::abs(v - row));
         return over < -kDoubt ? Sight::kNo : over > kDoubt ? Sight::kYes : Sight::kRounding;
@@ -145,7 +158,7 @@ class SlowSight {
     SensorModel sensor_;
     Pose camera_T_world_;
     double cell_;
-    std::vector<Eigen::Vector3d> squares_;
+    std::vector<Square> squares_;
 };
 
 bool isWell(const ViewScorer::Benefit& b) {
@@ -296,6 +309,53 @@ TEST_P(ScorerTwin, seesIntoTheGapsWhoseLinesAreOpen) {
     }
     EXPECT_GT(open, 20U);
     EXPECT_GT(closed, 20U);
+}
+
+TEST_P(ScorerTwin, seesTheFrontierThatNothingHides) {
+    SCOPED_TRACE("seed " + std::to_string(GetParam()));
+    Watched watched(GetParam(), 0.08, 0.02);
+    ViewScorer scorer = watched.scorer();
+    constexpr double kEdge = 0.06;
+    std::vector<FreeSpace::Frontier> frontier;
+    for (int i = 0; i < 300; ++i) {  // more than are drawn at once
+        frontier.push_back({watched.scene.place({0.5, -1.5, -1.2}, {3, 1.5, 1.2}).cast<float>(),
+                            watched.scene.place({-1, -1, -1}, {1, 1, 1}).cast<float>()});
+    }
+    scorer.setFrontier(frontier, kEdge);
+    std::size_t seen = 0;
+    std::size_t hidden = 0;
+    for (int i = 0; i < 20; ++i) {
+        const Pose pose = watched.anyPose();
+        SlowSight slow(watched, pose);
+        for (const FreeSpace::Frontier& place : frontier) {
+            slow.put(place, kEdge);
+        }
+        const ViewScorer::Seen view = scorer.sightsAtMost(pose);
+        for (std::size_t k = 0; k < frontier.size(); ++k) {
+            const auto it = std::find_if(
+                view.sights.begin(), view.sights.end(),
+                [&](const auto& s) { return s.item == 2 * (scorer.open().size() + k); });
+            const Sight sight = slow.at(frontier[k].centre, 0.6 * kEdge);
+            const Eigen::Vector3d ray = pose.translation - frontier[k].centre.cast<double>();
+            const double facing =
+                2 * ray.normalized().dot(frontier[k].area.cast<double>().normalized());
+            if (sight == Sight::kRounding || std::abs(facing) < 0.1) {
+                continue;
+            }
+            const double depth = (pose.inverse() * frontier[k].centre.cast<double>()).z();
+            const double full = 1.5 * watched.sensor.goodDepth(watched.resolution);
+            const double share = std::min(facing, 1.0) * std::min(1.0, std::pow(full / depth, 2));
+            const bool in = sight == Sight::kYes && facing > 0 && share > 0.02;
+            EXPECT_EQ(it != view.sights.end(), in);
+            if (in && it != view.sights.end()) {
+                EXPECT_NEAR(static_cast<double>(it->share), share, 1e-4);
+            }
+            seen += in ? 1 : 0;
+            hidden += sight == Sight::kNo && slow.inImage(frontier[k].centre) == Sight::kYes;
+        }
+    }
+    EXPECT_GT(seen, 100U);
+    EXPECT_GT(hidden, 100U);
 }
 
 INSTANTIATE_TEST_SUITE_P(Seeds, ScorerTwin, testing::Range(1U, 6U));

@@ -387,14 +387,17 @@ TEST(PixelGraph, NearestAndBoxAgreeWithBruteForce) {
         if (i % 2 == 0) {  // there
             p = Eigen::Vector3f(0.3F, 0.3F, 0.45F) + 0.1F * p;
             radius *= 0.25F;
+        } else if (i % 8 == 1) {
+            radius = 10;  // all of it
         }
         std::optional<VertexId> expected;
         float least = radius * radius;
         std::set<VertexId> inBox;
         graph.forEachVertex([&](VertexId id) {
             const Eigen::Vector3f d = graph.position(id) - p;
-            if (d.squaredNorm() <= least && (!expected || d.squaredNorm() < least)) {
-                least = d.squaredNorm();
+            const float squared = (d.x() * d.x() + d.y() * d.y()) + d.z() * d.z();
+            if (squared < least || (squared == least && (!expected || id < *expected))) {
+                least = squared;
                 expected = id;
             }
             if (d.cwiseAbs().maxCoeff() <= 0.1F) {

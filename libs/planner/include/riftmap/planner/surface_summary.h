@@ -74,7 +74,8 @@ class SurfaceSummary {
         /// others.
         std::vector<std::uint64_t> parts;
         /// Of the same cubes, where `parts` has none: edge [cells] of the largest cube of 1, 2 or
-        /// 4 around each that holds none either, as they lie side by side; 0 for the others.
+        /// 4 cells a side around each (the block divided evenly) that holds none either; 0 for the
+        /// others.
         std::vector<std::uint8_t> emptyAround;
     };
     /// All blocks by key, in ascending order.
