@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <random>
@@ -41,7 +42,8 @@ struct Maze {
     }
     std::size_t index(const Eigen::Vector3d& p) const {
         const Eigen::Vector3i v = (p / voxel).array().floor().cast<int>();
-        return static_cast<std::size_t>((v.z() * size.y() + v.y()) * size.x() + v.x());
+        const std::ptrdiff_t row = std::ptrdiff_t{v.z()} * size.y() + v.y();
+        return static_cast<std::size_t>(row * size.x() + v.x());
     }
     Eigen::Vector3d centre(int i) const {
         return voxel * (at(i).cast<double>() + Eigen::Vector3d::Constant(0.5));

@@ -316,10 +316,10 @@ TEST_P(ScorerTwin, seesTheFrontierThatNothingHides) {
     Watched watched(GetParam(), 0.08, 0.02);
     ViewScorer scorer = watched.scorer();
     constexpr double kEdge = 0.06;
-    std::vector<FreeSpace::Frontier> frontier;
-    for (int i = 0; i < 300; ++i) {  // more than are drawn at once
-        frontier.push_back({watched.scene.place({0.5, -1.5, -1.2}, {3, 1.5, 1.2}).cast<float>(),
-                            watched.scene.place({-1, -1, -1}, {1, 1, 1}).cast<float>()});
+    std::vector<FreeSpace::Frontier> frontier(300);  // more than are drawn at once
+    for (FreeSpace::Frontier& place : frontier) {
+        place.centre = watched.scene.place({0.5, -1.5, -1.2}, {3, 1.5, 1.2}).cast<float>();
+        place.area = watched.scene.place({-1, -1, -1}, {1, 1, 1}).cast<float>();
     }
     scorer.setFrontier(frontier, kEdge);
     std::size_t seen = 0;
