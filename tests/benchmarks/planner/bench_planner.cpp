@@ -35,13 +35,13 @@ struct Scene {
     std::size_t views = 0;
 };
 
-/// As config/explore-object.ini has it, with the sculpture.
+/// As config/explore-sculpture.ini has it.
 Scene object() {
     Scene scene{"object", true};
     scene.views = 12;
     scene.simulation.world.name = WorldOptions::Name::kSculpture;
-    scene.graph.targetResolution = 0.005;
-    scene.graph.gamma = 0.003;
+    scene.graph.targetResolution = 0.01;
+    scene.graph.gamma = 0.005;
     scene.planner.viewCost = 2;
     scene.planner.unknownWeight = 1;
     scene.planner.backgroundIsFree = true;
