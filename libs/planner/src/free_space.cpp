@@ -254,9 +254,9 @@ void FreeSpace::searchFrom(const Eigen::Vector3i& start, const Fits& fits) {
             }
         }
     }
-    // No step is shorter than a voxel, so voxels whose distances share a bucket that is narrower
-    // cannot shorten each other's way: their order is free. (A bucket as wide as a voxel may hold
-    // both ends of a step, by rounding.)
+    // A step is a voxel long at least. Buckets are a little narrower than that, so that no step
+    // ends in the bucket it begins in, and the order within one is free. (The hundredth that is
+    // spared is more than rounding makes of the length of any way.)
     std::vector<std::vector<std::uint32_t>> buckets(1);
     const auto first = static_cast<std::uint32_t>(index(start));
     distance_[first] = 0;

@@ -8,6 +8,7 @@
 #include <fstream>
 #include <functional>
 #include <random>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -64,7 +65,7 @@ struct Times {
     std::vector<double> values;
 };
 
-/// Views of the object from all sides and distances, or from anywhere to anywhere in the room.
+/// Views from all reachable places: towards the object's middle, or in a room in any direction.
 std::vector<Pose> candidates(const Knowledge& known) {
     constexpr int kCandidates = 200;
     std::mt19937 random(1);
@@ -73,7 +74,8 @@ std::vector<Pose> candidates(const Knowledge& known) {
     std::vector<Pose> poses;
     for (int i = 0; i < kCandidates; ++i) {
         const Eigen::Vector3d eye = eyes[random() % eyes.size()];
-        const Eigen::Vector3d any = eye + Eigen::Vector3d(uniform() - 0.5, uniform() - 0.5, 0);
+        const Eigen::Vector3d any =
+            eye + Eigen::Vector3d(uniform() - 0.5, uniform() - 0.5, uniform() - 0.5);
         poses.push_back(known.sensor().lookingAt(
             eye, known.surfaceBox() ? Eigen::Vector3d(known.surfaceBox()->center()) : any));
     }
@@ -81,7 +83,8 @@ std::vector<Pose> candidates(const Knowledge& known) {
 }
 
 /// Parts of a plan: the search for ways (without passages), and of each candidate what is drawn and
-/// weighed, around an object without and with the lines out of gaps.
+/// weighed, around an object without and with the lines out of gaps. The frontier there keeps the
+/// insides of thin shells, which the planner leaves out.
 std::vector<Times> partsOf(const Knowledge& known) {
     Times ways{"ways", "ms", {}};
     FreeSpace space = known.space();
@@ -136,7 +139,7 @@ std::vector<Times> measure(Scene scene) {
     stop.maxViews = static_cast<int>(scene.views);
     Times plan{"plan", "ms", {}};            // with `knowledge` of the view before
     Times knowledge{"knowledge", "ms", {}};  // what a view changes
-    std::vector<Times> parts;
+    std::vector<Times> parts = {{"half of its views", "", {}}};
     SurfaceExplorer explorer(
         platform, graph, planner, scene.planner, stop,
         [&](const StereoObservation& o) { return builder.build(o); }, {},
@@ -162,6 +165,9 @@ int run(const std::string& file) {
             break;
         }
         for (Times& t : measure(scene)) {
+            if (t.values.empty()) {
+                throw std::runtime_error(scene.name + " ended before there was a " + t.name);
+            }
             std::sort(t.values.begin(), t.values.end());
             for (const int percent : {50, 95}) {
                 const std::string figure =
@@ -188,5 +194,10 @@ int main(int argc, char** argv) {
         std::fprintf(stderr, "usage: bench-planner --csv FILE\n");
         return 2;
     }
-    return riftmap::run(argv[2]);
+    try {
+        return riftmap::run(argv[2]);
+    } catch (const std::exception& error) {
+        std::fprintf(stderr, "bench-planner: %s\n", error.what());
+        return 1;
+    }
 }

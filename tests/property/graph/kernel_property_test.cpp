@@ -92,6 +92,9 @@ TEST(GraphKernels, VerticesWithinAreThoseWhoseDistanceIsOnEveryInstructionSet) {
         for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
             hwy::SetSupportedTargetsForTest(target);
             EXPECT_EQ(verticesWithin(page, point, limit), expected) << hwy::TargetName(target);
+            Page empty = page;
+            empty.alive = 0;
+            EXPECT_EQ(verticesWithin(empty, point, limit), 0U);
         }
         hwy::SetSupportedTargetsForTest(0);
         within += static_cast<std::size_t>(std::popcount(expected));

@@ -19,7 +19,7 @@ namespace {
 struct Maze {
     explicit Maze(unsigned seed)
         : random(seed),
-          voxel(std::array{0.1, 0.03, 0.07}.at(seed / 2 % 3)),
+          voxel(std::array{0.1, 0.03, 0.07}.at(seed / 6 % 3)),
           size(seed % 3 == 0 ? Eigen::Vector3i(60, 1 + below(2), 1 + below(3))
                              : Eigen::Vector3i(3 + below(12), 3 + below(10), 1 + below(9))),
           box(Eigen::Vector3d::Zero(), voxel * size.cast<double>()),

@@ -371,7 +371,7 @@ TEST(PixelGraph, NearestAndBoxAgreeWithBruteForce) {
     PixelGraph graph;
     Scene before = scene;
     before.sphere({0.4, 0.3, 0.4}, 0.15);
-    scene.sphere({0.44, 0.3, 0.41}, 0.1);  // left of it: pages with vertices and with none
+    scene.sphere({0.44, 0.3, 0.41}, 0.1);  // smaller: pages keep places of vertices deleted
     graph.merge(makeView(before, smallCamera(), lookDown(0, 0, 1.5)));
     std::size_t deleted = 0;
     for (int i = 0; i < 8; ++i) {
@@ -383,8 +383,8 @@ TEST(PixelGraph, NearestAndBoxAgreeWithBruteForce) {
     std::uniform_real_distribution<float> in(-1.2F, 1.2F);
     for (int i = 0; i < 200; ++i) {
         Eigen::Vector3f p(in(random), in(random), 0.5F * in(random));
-        float radius = 0.1F + 0.1F * in(random);
-        if (i % 2 == 0) {  // there
+        float radius = std::abs(0.1F + 0.1F * in(random));
+        if (i % 2 == 0) {  // where vertices were deleted
             p = Eigen::Vector3f(0.3F, 0.3F, 0.45F) + 0.1F * p;
             radius *= 0.25F;
         } else if (i % 8 == 1) {

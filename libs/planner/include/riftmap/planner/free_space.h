@@ -15,7 +15,7 @@ namespace riftmap {
 
 /// Voxels of a cube of three along each edge.
 inline constexpr int kCubeOfVoxels = 27;
-/// Offset of the i-th of them from the middle one, which is the 13th; x goes first.
+/// Offset of voxel i of them from the middle one, which has the index 13; x goes first.
 inline Eigen::Vector3i aroundVoxel(int i) {
     return {i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1};
 }
