@@ -70,7 +70,10 @@ std::vector<Pose> candidates(const Knowledge& known) {
     constexpr int kCandidates = 200;
     std::mt19937 random(1);
     const auto uniform = [&] { return static_cast<double>(random()) / 4294967296.0; };
-    std::vector<Eigen::Vector3d> eyes = known.space().reachable(2);
+    const std::vector<Eigen::Vector3d> eyes = known.space().reachable(2);
+    if (eyes.empty()) {
+        throw std::runtime_error("no place can be reached");
+    }
     std::vector<Pose> poses;
     for (int i = 0; i < kCandidates; ++i) {
         const Eigen::Vector3d eye = eyes[random() % eyes.size()];
