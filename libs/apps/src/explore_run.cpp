@@ -373,7 +373,7 @@ std::vector<RiftRow> ExploreRun::certificate() const {
         row.coarse = r.coarse;
         row.cells = r.cells.size();
         row.firstView = r.firstView;
-        row.lastView = r.lastView;
+        row.lastView = explorer_->rifts().lastView(r);
         row.parents.assign(r.parents.begin(), r.parents.end());
         row.joined.assign(r.joined.begin(), r.joined.end());
         rows.push_back(row);
@@ -386,10 +386,14 @@ void ExploreRun::writeCells() const {
     CsvWriter table(directory_.file("rift_cells.csv"),
                     {"rift", "state", "reason", "type", "x", "y", "z", "nx", "ny", "nz",
                      "open_vertices", "edges", "attempts", "rim_m", "coarse_m2", "hidden_m2"});
-    for (const auto& [key, rift] : explorer_->rifts().owners()) {
-        const RiftRecord& r = explorer_->knowledge().ledger().records().at(key);
+    const auto& owners = explorer_->rifts().owners();
+    for (const auto& [key, r] : explorer_->knowledge().ledger().records()) {
+        const auto rift = owners.find(key);
+        if (rift == owners.end()) {
+            continue;
+        }
         const SurfaceCell& c = r.cell;
-        table.row({rift, nameOf(r.state), r.reason, kindNames(c.kinds), c.openPosition.x(),
+        table.row({rift->second, nameOf(r.state), r.reason, kindNames(c.kinds), c.openPosition.x(),
                    c.openPosition.y(), c.openPosition.z(), c.normal.x(), c.normal.y(), c.normal.z(),
                    c.open, c.highEdges, r.attempts.size(), c.rim, c.coarse, c.hidden});
     }

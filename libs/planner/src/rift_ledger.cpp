@@ -28,6 +28,32 @@ float RiftLedger::tear(const SurfaceCell& cell, double cellSize) const {
     return cell.rim * static_cast<float>(cellSize) + cell.coarse;
 }
 
+void RiftLedger::note(RiftRecord& record) {
+    if (!record.changed) {
+        record.changed = true;
+        changed_.push_back(&record);
+    }
+}
+
+void RiftLedger::setState(RiftRecord& record, RiftState state, const std::string& reason) {
+    --counts_[static_cast<std::size_t>(record.state)];
+    record.state = state;
+    ++counts_[static_cast<std::size_t>(state)];
+    record.reason = reason;
+    note(record);
+}
+
+std::vector<const RiftRecord*> RiftLedger::takeChanged() {
+    std::sort(changed_.begin(), changed_.end(),
+              [](const RiftRecord* a, const RiftRecord* b) { return a->cell.key < b->cell.key; });
+    for (RiftRecord* record : changed_) {
+        record->changed = false;
+    }
+    std::vector<const RiftRecord*> taken(changed_.begin(), changed_.end());
+    changed_.clear();
+    return taken;
+}
+
 void RiftLedger::updateCell(const SurfaceCell& cell, double cellSize) {
     const bool torn = cell.open > 0;
     const bool large = static_cast<double>(cell.rim) >= 1.5 * resolution_ ||
@@ -42,20 +68,20 @@ void RiftLedger::updateCell(const SurfaceCell& cell, double cellSize) {
         }
         RiftRecord& fresh = records_[cell.key];
         fresh.cell.key = cell.key;
+        ++counts_[static_cast<std::size_t>(fresh.state)];
         at = block.insert(at, &fresh);
     }
     RiftRecord& r = **at;
     if (!torn) {
         if (r.state != RiftState::kResolved) {
-            r.state = RiftState::kResolved;
-            r.reason = "closed";
+            setState(r, RiftState::kResolved, "closed");
         }
         return;
     }
     r.cell = cell;
+    note(r);
     if (!large) {
-        r.state = RiftState::kBelowResolution;
-        r.reason = "shorter than the asked resolution";
+        setState(r, RiftState::kBelowResolution, "shorter than the asked resolution");
         return;
     }
     const bool exhausted = static_cast<int>(r.attempts.size()) >= maxAttempts_;
@@ -63,16 +89,13 @@ void RiftLedger::updateCell(const SurfaceCell& cell, double cellSize) {
                          r.state == RiftState::kUnobservable || r.state == RiftState::kDeferred ||
                          exhausted;
     if (!givenUp) {
-        r.state = RiftState::kOpen;
-        r.reason.clear();
+        setState(r, RiftState::kOpen, "");
     } else if (r.state == RiftState::kResolved) {  // torn again, though views of it were in vain
-        r.state = RiftState::kBelowResolution;
-        r.reason = vainReason(r);
+        setState(r, RiftState::kBelowResolution, vainReason(r));
     } else if (r.reconsidered < 2 && cell.vertices > r.verticesThen + r.verticesThen / 3 + 8) {
         // New surface came up beside it.
         ++r.reconsidered;
-        r.state = RiftState::kOpen;
-        r.reason.clear();
+        setState(r, RiftState::kOpen, "");
         if (!r.attempts.empty()) {
             r.attempts.erase(r.attempts.begin());
         }
@@ -89,8 +112,7 @@ void RiftLedger::update(const SurfaceSummary& summary) {
         }
         for (RiftRecord* r : inBlock(blockKey)) {
             if (r->state != RiftState::kResolved && summary.find(r->cell.key) == nullptr) {
-                r->state = RiftState::kResolved;
-                r->reason = "seen through";
+                setState(*r, RiftState::kResolved, "seen through");
             }
         }
     }
@@ -162,8 +184,7 @@ double RiftLedger::tryWorth(const RiftRecord& record) const {
 void RiftLedger::giveUp(std::uint64_t key, RiftState state, const std::string& reason) {
     const auto it = records_.find(key);
     if (it != records_.end()) {
-        it->second.state = state;
-        it->second.reason = reason;
+        setState(it->second, state, reason);
         it->second.verticesThen = it->second.cell.vertices;
     }
 }
@@ -171,8 +192,7 @@ void RiftLedger::giveUp(std::uint64_t key, RiftState state, const std::string& r
 void RiftLedger::reopen(RiftState state) {
     for (auto& [key, r] : records_) {
         if (r.state == state) {
-            r.state = RiftState::kOpen;
-            r.reason.clear();
+            setState(r, RiftState::kOpen, "");
         }
     }
 }
@@ -180,18 +200,9 @@ void RiftLedger::reopen(RiftState state) {
 void RiftLedger::deferOpen(const std::string& reason) {
     for (auto& [key, r] : records_) {
         if (r.state == RiftState::kOpen) {
-            r.state = RiftState::kDeferred;
-            r.reason = reason;
+            setState(r, RiftState::kDeferred, reason);
         }
     }
-}
-
-std::array<std::size_t, kRiftStates> RiftLedger::counts() const {
-    std::array<std::size_t, kRiftStates> n{};
-    for (const auto& [key, r] : records_) {
-        ++n[static_cast<std::size_t>(r.state)];
-    }
-    return n;
 }
 
 bool RiftLedger::tried(const RiftRecord& record, const Eigen::Vector3d& eye) {

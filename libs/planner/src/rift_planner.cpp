@@ -219,7 +219,10 @@ void Choice::rate(Candidate& c, const ViewScore& score) const {
 void Choice::scoreFrom(std::size_t first) {
     parallelForEach(candidates_.size() - first, 4, [&](std::size_t i) {
         Candidate& c = candidates_[first + i];
-        rate(c, k_.surfaceBox() ? scoreAround(c.pose) : scorer_.score(c.pose));
+        rate(c, k_.surfaceBox() ? scoreAround(c.pose)
+                : c.drawing     ? scorer_.score(c.pose, *c.drawing)
+                                : scorer_.score(c.pose));
+        c.drawing.reset();
     });
 }
 
@@ -231,7 +234,9 @@ void Choice::preselect() {
         return;
     }
     parallelForEach(candidates_.size(), 4, [&](std::size_t i) {
-        rate(candidates_[i], scorer_.estimate(candidates_[i].pose));
+        Candidate& c = candidates_[i];
+        c.drawing = scorer_.draw(c.pose);
+        rate(c, scorer_.estimate(c.pose, *c.drawing));
     });
     std::stable_sort(candidates_.begin(), candidates_.end(),
                      [](const Candidate& a, const Candidate& b) { return a.utility > b.utility; });

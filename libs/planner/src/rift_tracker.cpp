@@ -3,8 +3,10 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <iterator>
 #include <limits>
 #include <string_view>
+#include <utility>
 
 #include "riftmap/core/union_find.h"
 
@@ -13,10 +15,10 @@ namespace riftmap {
 namespace {
 
 /// The reason that most of the cells have; of equals the first in the alphabet.
-std::string commonReason(const std::vector<std::uint64_t>& cells, const RiftRecords& records) {
+std::string commonReason(const std::vector<const RiftRecord*>& cells) {
     std::map<std::string_view, std::size_t> votes;
-    for (const std::uint64_t key : cells) {
-        ++votes[records.at(key).reason];
+    for (const RiftRecord* cell : cells) {
+        ++votes[cell->reason];
     }
     const auto most =
         std::max_element(votes.begin(), votes.end(),
@@ -33,37 +35,32 @@ std::size_t heirOf(const std::map<std::size_t, std::size_t>& cellsByGroup) {
 
 }  // namespace
 
-std::vector<CellGroup> connectedCells(const RiftRecords& records) {
-    std::vector<std::uint64_t> keys;
-    std::vector<RiftState> states;
-    for (const auto& [key, record] : records) {
-        if (record.state != RiftState::kResolved) {
-            keys.push_back(key);
-            states.push_back(record.state);
-        }
-    }
-    UnionFind sets(keys.size());
+/// The groups of these cells, which ascend in key, in the order of their first keys.
+std::vector<RiftTracker::Group> RiftTracker::connected(const std::vector<Cell>& cells) {
+    const auto keyOf = [&](std::size_t i) { return cells[i].record->cell.key; };
+    const auto stateOf = [&](std::size_t i) { return cells[i].record->state; };
+    UnionFind sets(cells.size());
     for (const std::uint64_t offset : SurfaceSummary::neighbourOffsets()) {
         std::size_t j = 0;  // walks ahead of i, since both ascend
-        for (std::size_t i = 0; i < keys.size(); ++i) {
-            while (j < keys.size() && keys[j] < keys[i] + offset) {
+        for (std::size_t i = 0; i < cells.size(); ++i) {
+            while (j < cells.size() && keyOf(j) < keyOf(i) + offset) {
                 ++j;
             }
-            if (j < keys.size() && keys[j] == keys[i] + offset && states[i] == states[j]) {
+            if (j < cells.size() && keyOf(j) == keyOf(i) + offset && stateOf(i) == stateOf(j)) {
                 sets.unite(static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(j));
             }
         }
     }
-    std::vector<CellGroup> groups;
-    std::vector<std::size_t> groupOf(keys.size());
-    for (std::uint32_t i = 0; i < keys.size(); ++i) {
+    std::vector<Group> groups;
+    std::vector<std::size_t> groupOf(cells.size());
+    for (std::uint32_t i = 0; i < cells.size(); ++i) {
         const std::uint32_t root = sets.root(i);
         if (root == i) {
             groupOf[i] = groups.size();
-            groups.push_back({states[i], {}});
+            groups.push_back({stateOf(i), {}});
         }
         groupOf[i] = groupOf[root];
-        groups[groupOf[i]].cells.push_back(keys[i]);
+        groups[groupOf[i]].cells.push_back(cells[i]);
     }
     return groups;
 }
@@ -76,6 +73,62 @@ void RiftTracker::noteTries(std::size_t view, const std::vector<std::uint64_t>& 
     }
 }
 
+/// The rifts whose cells have changed, and those that cells of a new state touch.
+std::set<std::uint32_t> RiftTracker::affectedBy(
+    const std::vector<const RiftRecord*>& changed) const {
+    std::set<std::uint32_t> affected;
+    for (const RiftRecord* cell : changed) {
+        const std::uint64_t key = cell->cell.key;
+        const auto owner = owners_.find(key);
+        const bool owned = owner != owners_.end();
+        if (owned) {
+            affected.insert(owner->second);
+        }
+        if (cell->state == RiftState::kResolved ||
+            (owned && rifts_.at(owner->second).state == cell->state)) {
+            continue;
+        }
+        for (const std::uint64_t offset : SurfaceSummary::neighbourOffsets()) {
+            for (const std::uint64_t beside : {key - offset, key + offset}) {
+                const auto other = owners_.find(beside);
+                if (other != owners_.end() && rifts_.at(other->second).state == cell->state) {
+                    affected.insert(other->second);
+                }
+            }
+        }
+    }
+    return affected;
+}
+
+/// What is torn of these rifts and of what has changed, ascending in key.
+std::vector<RiftTracker::Cell> RiftTracker::tornOf(
+    const std::set<std::uint32_t>& affected, const std::vector<const RiftRecord*>& changed) const {
+    std::vector<Cell> torn;
+    const auto add = [&](const std::vector<const RiftRecord*>& records, std::uint32_t owner) {
+        for (const RiftRecord* record : records) {
+            if (record->state != RiftState::kResolved) {
+                torn.push_back({record, owner});
+            }
+        }
+    };
+    for (const std::uint32_t id : affected) {
+        add(rifts_.at(id).cells, id);
+    }
+    add(changed, kNone);
+    std::sort(torn.begin(), torn.end(), [](const Cell& a, const Cell& b) {
+        return std::pair(a.record->cell.key, a.owner) < std::pair(b.record->cell.key, b.owner);
+    });
+    const auto same = [](const Cell& a, const Cell& b) { return a.record == b.record; };
+    torn.erase(std::unique(torn.begin(), torn.end(), same), torn.end());  // the first is owned
+    return torn;
+}
+
+void RiftTracker::setState(TrackedRift& rift, RiftState state) {
+    --counts_[static_cast<std::size_t>(rift.state)];
+    rift.state = state;
+    ++counts_[static_cast<std::size_t>(state)];
+}
+
 /// The rift that a group is from now on: the oldest of those that live on in it, which the others
 /// join; else a new one.
 std::uint32_t RiftTracker::nameOf(const std::set<std::uint32_t>& heirTo,
@@ -85,6 +138,7 @@ std::uint32_t RiftTracker::nameOf(const std::set<std::uint32_t>& heirTo,
         TrackedRift& fresh = rifts_[nextId_];
         fresh.id = nextId_++;
         fresh.firstView = view;
+        ++counts_[static_cast<std::size_t>(fresh.state)];
         for (const auto& [id, cells] : shared) {
             fresh.parents.insert(id);
             fresh.tries.insert(rifts_.at(id).tries.begin(), rifts_.at(id).tries.end());
@@ -102,19 +156,18 @@ std::uint32_t RiftTracker::nameOf(const std::set<std::uint32_t>& heirTo,
     return oldest;
 }
 
-void RiftTracker::describe(TrackedRift& rift, const CellGroup& group,
-                           const RiftRecords& records) const {
+void RiftTracker::describe(TrackedRift& rift, const Group& group) {
     Eigen::Vector3d mean = Eigen::Vector3d::Zero();
     Eigen::Vector3d normal = Eigen::Vector3d::Zero();
     Eigen::AlignedBox3i box;
-    rift.cells = group.cells;
-    rift.state = group.state;
-    rift.reason = commonReason(group.cells, records);
+    rift.cells.clear();
+    setState(rift, group.state);
     rift.kinds = 0;
     rift.rim = rift.coarse = 0;
     rift.openVertices = rift.highEdges = 0;
-    for (const std::uint64_t key : group.cells) {
-        const SurfaceCell& cell = records.at(key).cell;
+    for (const Cell& torn : group.cells) {
+        rift.cells.push_back(torn.record);
+        const SurfaceCell& cell = torn.record->cell;
         rift.kinds |= cell.kinds;
         rift.rim += static_cast<double>(cell.rim);
         rift.coarse += static_cast<double>(cell.coarse);
@@ -122,15 +175,16 @@ void RiftTracker::describe(TrackedRift& rift, const CellGroup& group,
         rift.highEdges += cell.highEdges;
         mean += cell.openPosition.cast<double>();
         normal += cell.openNormal.cast<double>();
-        box.extend(SurfaceSummary::indexOf(key));
+        box.extend(SurfaceSummary::indexOf(cell.key));
     }
-    mean /= static_cast<double>(group.cells.size());
+    rift.reason = commonReason(rift.cells);
+    mean /= static_cast<double>(rift.cells.size());
     rift.extent = cellSize_ * (box.sizes().maxCoeff() + 1);
     rift.normal = normal.norm() > 1e-6 ? normal.normalized().cast<float>().eval()
                                        : Eigen::Vector3f::Zero().eval();
     float least = std::numeric_limits<float>::infinity();
-    for (const std::uint64_t key : group.cells) {
-        const Eigen::Vector3f& place = records.at(key).cell.openPosition;
+    for (const RiftRecord* record : rift.cells) {
+        const Eigen::Vector3f& place = record->cell.openPosition;
         const float distance = (place - mean.cast<float>()).squaredNorm();
         if (distance < least) {
             least = distance;
@@ -139,17 +193,18 @@ void RiftTracker::describe(TrackedRift& rift, const CellGroup& group,
     }
 }
 
-void RiftTracker::update(std::size_t view, const RiftRecords& records,
+void RiftTracker::update(std::size_t view, const std::vector<const RiftRecord*>& changed,
                          const std::vector<std::uint64_t>& aimedAt) {
     noteTries(view, aimedAt);
-    const std::vector<CellGroup> groups = connectedCells(records);
+    const std::set<std::uint32_t> affected = affectedBy(changed);
+    const std::vector<Group> groups = connected(tornOf(affected, changed));
     std::vector<std::map<std::uint32_t, std::size_t>> shared(groups.size());  // cells by rift
     std::map<std::uint32_t, std::map<std::size_t, std::size_t>> lives;        // cells by group
     for (std::size_t g = 0; g < groups.size(); ++g) {
-        for (const std::uint64_t key : groups[g].cells) {
-            if (const auto owner = owners_.find(key); owner != owners_.end()) {
-                ++shared[g][owner->second];
-                ++lives[owner->second][g];
+        for (const Cell& cell : groups[g].cells) {
+            if (cell.owner != kNone) {
+                ++shared[g][cell.owner];
+                ++lives[cell.owner][g];
             }
         }
     }
@@ -157,38 +212,38 @@ void RiftTracker::update(std::size_t view, const RiftRecords& records,
     for (const auto& [id, cellsByGroup] : lives) {
         heirTo[heirOf(cellsByGroup)].insert(id);
     }
-    for (auto& [id, rift] : rifts_) {
-        if (rift.state != RiftState::kResolved && !lives.contains(id)) {
-            rift.state = RiftState::kResolved;
-            rift.reason = commonReason(rift.cells, records);
+    for (const std::uint32_t id : affected) {
+        TrackedRift& rift = rifts_.at(id);
+        for (const RiftRecord* cell : rift.cells) {
+            if (cell->state == RiftState::kResolved) {
+                owners_.erase(cell->cell.key);
+            }
+        }
+        if (!lives.contains(id)) {
+            setState(rift, RiftState::kResolved);
+            rift.reason = commonReason(rift.cells);
+            rift.closedAfter = view_;
         }
     }
     std::vector<std::uint32_t> names;
     for (std::size_t g = 0; g < groups.size(); ++g) {
         names.push_back(nameOf(heirTo[g], shared[g], view));
     }
-    owners_.clear();
     for (std::size_t g = 0; g < groups.size(); ++g) {
-        for (auto id = heirTo[g].begin(); id != heirTo[g].end(); ++id) {
-            if (*id != names[g]) {  // has joined
-                rifts_.erase(*id);
+        for (const std::uint32_t id : heirTo[g]) {
+            if (id != names[g]) {  // has joined
+                --counts_[static_cast<std::size_t>(rifts_.at(id).state)];
+                rifts_.erase(id);
             }
         }
-        TrackedRift& rift = rifts_.at(names[g]);
-        describe(rift, groups[g], records);
-        rift.lastView = view;
-        for (const std::uint64_t key : groups[g].cells) {
-            owners_[key] = names[g];
+        describe(rifts_.at(names[g]), groups[g]);
+        for (const Cell& cell : groups[g].cells) {
+            if (cell.owner != names[g]) {
+                owners_[cell.record->cell.key] = names[g];
+            }
         }
     }
-}
-
-std::array<std::size_t, kRiftStates> RiftTracker::counts() const {
-    std::array<std::size_t, kRiftStates> n{};
-    for (const auto& [id, rift] : rifts_) {
-        ++n[static_cast<std::size_t>(rift.state)];
-    }
-    return n;
+    view_ = view;
 }
 
 }  // namespace riftmap

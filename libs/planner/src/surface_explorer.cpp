@@ -91,8 +91,10 @@ void SurfaceExplorer::look(const std::optional<ViewPlan>& plan, double planMs) {
     }
     step.knowledgeMs = msSince(t);
     lastKnowledgeMs_ = step.knowledgeMs;
-    rifts_.update(step.view, knowledge_.ledger().records(),
+    t = Clock::now();
+    rifts_.update(step.view, knowledge_.ledger().takeChanged(),
                   plan ? plan->cells : std::vector<std::uint64_t>());
+    step.riftsMs += msSince(t);
     step.input = &view;
     step.pathLength = pathLength_;
     step.seconds = clock_();
@@ -157,7 +159,7 @@ void SurfaceExplorer::run(const std::atomic<bool>& interrupt, double secondsBefo
     if (stopReason_ != "complete") {
         knowledge_.ledger().deferOpen(stopReason_);
     }
-    rifts_.update(views() - 1, knowledge_.ledger().records(), {});
+    rifts_.update(views() - 1, knowledge_.ledger().takeChanged(), {});
 }
 
 }  // namespace riftmap

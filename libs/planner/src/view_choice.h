@@ -15,7 +15,8 @@ struct Candidate {
     Pose pose;
     double path = 0;  ///< [m]
     ViewScore score;
-    double utility = 0;  ///< gain for a metre
+    double utility = 0;                                            ///< gain for a metre
+    std::shared_ptr<const ViewScorer::Drawing> drawing = nullptr;  ///< until it is scored
 };
 
 /// A unit vector at a right angle to `n`.

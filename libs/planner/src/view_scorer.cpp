@@ -35,6 +35,11 @@ struct ViewScorer::DepthBuffer {
     void splat(const Points& points, const Pose& camera_T_world, float half, double farLimit);
 };
 
+struct ViewScorer::Drawing {
+    DepthBuffer buffer;
+    std::vector<const BlockView*> seen;  ///< those in sight, in the blocks' own order
+};
+
 /// Draws squares that face the camera around points of the map within its range; half the edge in
 /// metres.
 void ViewScorer::DepthBuffer::splat(const Points& points, const Pose& camera_T_world, float half,
@@ -226,10 +231,11 @@ ViewScorer::Benefit ViewScorer::benefit(const RiftRecord& record, const Pose& wo
     return result;
 }
 
-ViewScorer::DepthBuffer ViewScorer::draw(const Pose& camera_T_world,
-                                         std::vector<const BlockView*>& seen) const {
+std::shared_ptr<const ViewScorer::Drawing> ViewScorer::draw(const Pose& world_T_camera) const {
     const StereoCamera& c = sensor_.camera;
-    DepthBuffer b;
+    const auto drawing = std::make_shared<Drawing>();
+    DepthBuffer& b = drawing->buffer;
+    std::vector<const BlockView*>& seen = drawing->seen;
     b.width = std::max(1, c.width / kPixels);
     b.height = std::max(1, c.height / kPixels);
     b.fx = static_cast<float>(c.fx / kPixels);
@@ -237,6 +243,7 @@ ViewScorer::DepthBuffer ViewScorer::draw(const Pose& camera_T_world,
     b.cx = static_cast<float>((c.cx + 0.5) / kPixels - 0.5);
     b.cy = static_cast<float>((c.cy + 0.5) / kPixels - 0.5);
     b.depth.assign(static_cast<std::size_t>(b.width) * static_cast<std::size_t>(b.height), kFar);
+    const Pose camera_T_world = world_T_camera.inverse();
     const Eigen::Matrix3f rotation = camera_T_world.rotation.cast<float>();
     const Eigen::Vector3f translation = camera_T_world.translation.cast<float>();
     const float half = 0.6F * static_cast<float>(summary_->cellSize());
@@ -262,11 +269,11 @@ ViewScorer::DepthBuffer ViewScorer::draw(const Pose& camera_T_world,
             }
         }
     }
-    std::sort(seen.begin(), seen.end());  // in the blocks' own order
+    std::sort(seen.begin(), seen.end());
     for (const BlockView* block : seen) {
         b.splat(block->block->positions, camera_T_world, half, sensor_.farLimit);
     }
-    return b;
+    return drawing;
 }
 
 template <class F>
@@ -333,27 +340,27 @@ bool ViewScorer::visible(const DepthBuffer& buffer, const Eigen::Vector3f& inCam
     return depth && *depth >= inCamera.z() - slack;
 }
 
-ViewScore ViewScorer::estimate(const Pose& world_T_camera) const {
-    return scoreEvery((open_.size() + kMostOpen - 1) / kMostOpen, 2 * kRayStride, world_T_camera);
+ViewScore ViewScorer::estimate(const Pose& world_T_camera, const Drawing& drawing) const {
+    return scoreEvery((open_.size() + kMostOpen - 1) / kMostOpen, 2 * kRayStride, world_T_camera,
+                      drawing);
 }
 
-ViewScore ViewScorer::score(const Pose& world_T_camera) const {
-    return scoreEvery(1, kRayStride, world_T_camera);
+ViewScore ViewScorer::score(const Pose& world_T_camera, const Drawing& drawing) const {
+    return scoreEvery(1, kRayStride, world_T_camera, drawing);
 }
 
 /// Weighs one open cell in `stride` for as many, and one ray in `rayStride` along both axes.
-ViewScore ViewScorer::scoreEvery(std::size_t stride, int rayStride,
-                                 const Pose& world_T_camera) const {
+ViewScore ViewScorer::scoreEvery(std::size_t stride, int rayStride, const Pose& world_T_camera,
+                                 const Drawing& drawing) const {
     stride = std::max<std::size_t>(stride, 1);
     ViewScore result;
     const Pose camera_T_world = world_T_camera.inverse();
-    std::vector<const BlockView*> seen;
-    const DepthBuffer buffer = draw(camera_T_world, seen);
+    const DepthBuffer& buffer = drawing.buffer;
     result.nearShare = nearShareOf(buffer);
     const StereoCamera& camera = sensor_.camera;
     const double cell = summary_->cellSize();
     double seenWell = 0;  // [m^2] of openGain
-    for (const BlockView* block : seen) {
+    for (const BlockView* block : drawing.seen) {
         const std::size_t first = (block->firstOpen + stride - 1) / stride * stride;
         for (std::size_t i = first; i < block->lastOpen; i += stride) {
             const RiftRecord& record = *open_[i];
@@ -388,10 +395,8 @@ ViewScore ViewScorer::scoreEvery(std::size_t stride, int rayStride,
 }
 
 std::vector<Eigen::Vector3d> ViewScorer::unknownSeen(const Pose& world_T_camera) const {
-    std::vector<const BlockView*> seen;
-    const DepthBuffer buffer = draw(world_T_camera.inverse(), seen);
     std::vector<Eigen::Vector3d> places;
-    forEachUnknown(world_T_camera, buffer, kRayStride,
+    forEachUnknown(world_T_camera, draw(world_T_camera)->buffer, kRayStride,
                    [&](const Eigen::Vector3d& p, double) { places.push_back(p); });
     return places;
 }
@@ -445,8 +450,8 @@ void ViewScorer::dropHidden(std::vector<Sight>& sights, std::vector<std::uint32_
 
 ViewScorer::Seen ViewScorer::sightsAtMost(const Pose& world_T_camera) const {
     const Pose camera_T_world = world_T_camera.inverse();
-    std::vector<const BlockView*> seen;
-    DepthBuffer buffer = draw(camera_T_world, seen);
+    const std::shared_ptr<const Drawing> drawing = draw(world_T_camera);
+    DepthBuffer buffer = drawing->buffer;
     Seen result;
     result.nearShare = nearShareOf(buffer);
     const Eigen::Matrix3f rotation = camera_T_world.rotation.cast<float>();
@@ -459,7 +464,7 @@ ViewScorer::Seen ViewScorer::sightsAtMost(const Pose& world_T_camera) const {
         }
     };
     const auto margin = static_cast<float>(2.0 * summary_->cellSize());
-    for (const BlockView* block : seen) {
+    for (const BlockView* block : drawing->seen) {
         for (std::size_t i = block->firstOpen; i < block->lastOpen; ++i) {
             const SurfaceCell& cell = open_[i]->cell;
             const Eigen::Vector3f p =

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <map>
 #include <random>
 #include <set>
 
@@ -21,25 +22,40 @@ std::uint64_t keyOf(const Index& i) {
     return SurfaceSummary::keyAt({i[0], i[1], i[2]});
 }
 
-/// The ledger never forgets: what was torn and is no more is resolved.
-void write(const Tears& tears, RiftRecords& records) {
+using Records = std::map<std::uint64_t, RiftRecord>;
+using Changed = std::vector<const RiftRecord*>;
+
+/// The ledger never forgets: what was torn and is no more is resolved. Returns the records of
+/// which the state has changed.
+Changed write(const Tears& tears, Records& records) {
+    std::map<std::uint64_t, RiftState> before;
     for (auto& [key, record] : records) {
+        before[key] = record.state;
         record.state = RiftState::kResolved;
         record.reason = "closed";
     }
     for (const auto& [index, state] : tears) {
-        RiftRecord& r = records[keyOf(index)];
+        const auto [it, isNew] = records.try_emplace(keyOf(index));
+        RiftRecord& r = it->second;
         r.state = state;
         r.reason = std::string("is ") + nameOf(state);
         r.cell.key = keyOf(index);
         r.cell.open = 3;
-        r.cell.rim = 0.05F;
+        r.cell.rim = isNew ? 0.05F : r.cell.rim;
         r.cell.openPosition =
             (Eigen::Vector3f(static_cast<float>(index[0]), static_cast<float>(index[1]),
                              static_cast<float>(index[2])) +
              Eigen::Vector3f::Constant(0.5F)) *
             static_cast<float>(kCell);
     }
+    Changed changed;
+    for (const auto& [key, record] : records) {
+        const auto was = before.find(key);
+        if (was == before.end() || was->second != record.state) {
+            changed.push_back(&record);
+        }
+    }
+    return changed;
 }
 
 Tears row(int from, int to, RiftState state = RiftState::kOpen) {
@@ -58,17 +74,18 @@ Tears operator+(Tears a, const Tears& b) {
 class RiftTrackerByHand : public testing::Test {
  protected:
     void see(const Tears& tears, const std::vector<Index>& aimedAt = {}) {
-        write(tears, records);
+        const Changed changed = write(tears, records);
         std::vector<std::uint64_t> keys;
         for (const Index& i : aimedAt) {
             keys.push_back(keyOf(i));
         }
-        tracker.update(view++, records, keys);
+        tracker.update(view++, changed, keys);
     }
     const TrackedRift& rift(std::uint32_t id) const { return tracker.rifts().at(id); }
+    std::size_t lastView(std::uint32_t id) const { return tracker.lastView(rift(id)); }
     std::uint32_t at(int x) const { return tracker.owners().at(keyOf({x, 0, 0})); }
 
-    RiftRecords records;
+    Records records;
     RiftTracker tracker{kCell};
     std::size_t view = 0;
 };
@@ -93,11 +110,11 @@ TEST_F(RiftTrackerByHand, aRiftShrinksSplitsJoinsAndIsResolved) {
     EXPECT_FALSE(tracker.rifts().contains(1));
     EXPECT_EQ(rift(0).joined, std::set<std::uint32_t>{1});
     EXPECT_EQ(rift(0).tries, (std::set<std::size_t>{1, 3}));
-    EXPECT_EQ(rift(0).lastView, 4U);
+    EXPECT_EQ(lastView(0), 4U);
     see({});
     EXPECT_EQ(rift(0).state, RiftState::kResolved);
     EXPECT_EQ(rift(0).reason, "closed");
-    EXPECT_EQ(rift(0).lastView, 4U);
+    EXPECT_EQ(lastView(0), 4U);
     EXPECT_EQ(rift(0).cells.size(), 15U);
     see(row(0, 0));  // torn again
     EXPECT_EQ(at(0), 2U);
@@ -251,7 +268,7 @@ TEST_P(RiftTrackerAtRandom, followsAsTheSlowTwinDoes) {
     const auto below = [&](std::uint32_t n) { return static_cast<int>(random() % n); };
     RiftTracker tracker(kCell);
     SlowTracker slow;
-    RiftRecords records;
+    Records records;
     Tears tears;
     std::size_t splits = 0;
     std::size_t joins = 0;
@@ -264,10 +281,20 @@ TEST_P(RiftTrackerAtRandom, followsAsTheSlowTwinDoes) {
                 tears[cell] = below(6) == 0 ? RiftState::kUnreachable : RiftState::kOpen;
             }
         }
-        write(tears, records);
-        tracker.update(view, records, {});
+        Changed changed = write(tears, records);
+        for (auto& [key, record] : records) {  // and others in length only
+            if (below(8) == 0) {
+                record.cell.rim = 0.01F * static_cast<float>(below(10));
+                if (std::find(changed.begin(), changed.end(), &record) == changed.end()) {
+                    changed.push_back(&record);
+                }
+            }
+        }
+        std::shuffle(changed.begin(), changed.end(), random);
+        tracker.update(view, changed, {});
         slow.update(tears);
         ASSERT_EQ(tracker.rifts().size(), slow.lives.size());
+        std::array<std::size_t, kRiftStates> counts{};
         std::map<std::uint32_t, int> told;  // every id once
         for (const auto& [id, life] : slow.lives) {
             ASSERT_TRUE(tracker.rifts().contains(id)) << id;
@@ -284,7 +311,19 @@ TEST_P(RiftTrackerAtRandom, followsAsTheSlowTwinDoes) {
                 }
             }
             std::sort(keys.begin(), keys.end());
-            EXPECT_EQ(rift.cells, keys) << id;
+            std::vector<std::uint64_t> cells;
+            double rim = 0;
+            for (const RiftRecord* cell : rift.cells) {
+                cells.push_back(cell->cell.key);
+                rim += static_cast<double>(cell->cell.rim);
+            }
+            EXPECT_EQ(cells, keys) << id;
+            if (!life.gone) {
+                EXPECT_EQ(rift.rim, rim) << id;
+                EXPECT_EQ(tracker.lastView(rift), view) << id;
+                EXPECT_EQ(rift.reason, std::string("is ") + nameOf(rift.state)) << id;
+            }
+            ++counts[static_cast<std::size_t>(rift.state)];
             ++told[id];
             for (const std::uint32_t other : rift.joined) {
                 ++told[other];
@@ -292,6 +331,7 @@ TEST_P(RiftTrackerAtRandom, followsAsTheSlowTwinDoes) {
             splits += life.parents.size();
             joins += life.joined.size();
         }
+        EXPECT_EQ(tracker.counts(), counts);
         EXPECT_EQ(tracker.owners().size(), tears.size());
         ASSERT_EQ(told.size(), slow.nextId);
         for (const auto& [id, times] : told) {

@@ -4,6 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <functional>
+#include <map>
+#include <string>
 
 #include "planner_scene.h"
 #include "riftmap/planner/view_scorer.h"
@@ -214,6 +217,66 @@ TEST_F(LedgerOnWall, whatIsOpenAtTheEndIsDeferred) {
     ledger.deferOpen("max_views");
     EXPECT_EQ(ledger.counts()[static_cast<std::size_t>(RiftState::kOpen)], 0U);
     EXPECT_GT(ledger.counts()[static_cast<std::size_t>(RiftState::kDeferred)], 0U);
+}
+
+TEST_F(LedgerOnWall, whatIsWrittenIsToldAndCounted) {
+    EXPECT_EQ(ledger.takeChanged().size(), ledger.records().size());
+    const std::vector<std::function<void()>> writes = {
+        [&] {
+            see(lookAt({0, 1, 0}, {1, 1, 0}));
+        },
+        [&] {
+            see(lookAt({-0.2, -0.9, 0.1}, {1, -0.9, 0}));
+        },
+        [&] { ledger.giveUp(anyOpen(), RiftState::kUnreachable, "no way there"); },
+        [&] { ledger.giveUp(anyOpen(), RiftState::kUnobservable, "hidden"); },
+        [&] { ledger.reopen(RiftState::kUnreachable); },
+        [&] {
+            const Eigen::Vector3d eye(-0.2, -0.9, 0.1);
+            for (int i = 0; i < 3; ++i) {  // as many in vain as it takes to give it up
+                ledger.judge(summary, ledger.tears({anyOpen()}, summary.cellSize()), eye);
+            }
+        },
+        [&] {
+            for (const auto& [key, record] : ledger.records()) {
+                if (record.state == RiftState::kOpen) {
+                    ledger.giveUp(key, RiftState::kUnobservable, "hidden");
+                }
+            }
+        },
+        [&] {
+            see(lookAt({-0.4, 0, 0.3}, {1, 0, 0.3}));
+        },  // what is given up is still described
+        [&] { ledger.reopen(RiftState::kUnobservable); },
+        [&] { ledger.deferOpen("max_views"); },
+    };
+    for (std::size_t i = 0; i < writes.size(); ++i) {
+        SCOPED_TRACE("write " + std::to_string(i));
+        const std::map<std::uint64_t, RiftRecord> before = ledger.records();
+        writes[i]();
+        const std::vector<const RiftRecord*> changed = ledger.takeChanged();
+        EXPECT_TRUE(ledger.takeChanged().empty());
+        for (std::size_t j = 1; j < changed.size(); ++j) {
+            EXPECT_LT(changed[j - 1]->cell.key, changed[j]->cell.key);
+        }
+        std::array<std::size_t, kRiftStates> counts{};
+        std::size_t written = 0;
+        for (const auto& [key, now] : ledger.records()) {
+            ++counts[static_cast<std::size_t>(now.state)];
+            const auto it = before.find(key);
+            const bool same = it != before.end() && it->second.state == now.state &&
+                              it->second.reason == now.reason &&
+                              it->second.cell.open == now.cell.open &&
+                              it->second.cell.rim == now.cell.rim &&
+                              it->second.cell.openPosition == now.cell.openPosition;
+            if (!same) {
+                ++written;
+                EXPECT_TRUE(std::find(changed.begin(), changed.end(), &now) != changed.end());
+            }
+        }
+        EXPECT_GT(written, 0U);
+        EXPECT_EQ(ledger.counts(), counts);
+    }
 }
 
 TEST_F(LedgerOnWall, viewsOverTheRimPromiseMoreThanTheOneTaken) {

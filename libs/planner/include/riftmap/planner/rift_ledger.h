@@ -43,6 +43,7 @@ struct RiftRecord {
     std::vector<Attempt> attempts;   ///< those that did not help
     int reconsidered = 0;            ///< times it was opened again
     std::uint32_t verticesThen = 0;  ///< in the cell when it was given up
+    bool changed = false;            ///< since RiftLedger::takeChanged()
 };
 
 /// A tear before the view that is to close it.
@@ -80,16 +81,22 @@ class RiftLedger {
 
     /// Size of the tear in a cell [m^2]: area that closing it may bring at least.
     float tear(const SurfaceCell& cell, double cellSize) const;
+    /// By key; none is ever removed, and each stays where it is.
     const std::map<std::uint64_t, RiftRecord>& records() const { return records_; }
-    /// Those of the cells in one block of the summary, ascending in key; they stay where they are.
+    /// The records written since the last call, ascending in key.
+    std::vector<const RiftRecord*> takeChanged();
+    /// Those of the cells in one block of the summary, ascending in key.
     const std::vector<RiftRecord*>& inBlock(std::uint64_t block) const;
-    std::array<std::size_t, kRiftStates> counts() const;
+    /// Of records, by state.
+    const std::array<std::size_t, kRiftStates>& counts() const { return counts_; }
     /// Share of the area seen again that a vain try from here repeats: true if some attempt looked
     /// from nearly the same side and distance.
     static bool tried(const RiftRecord& record, const Eigen::Vector3d& eye);
 
  private:
     void updateCell(const SurfaceCell& cell, double cellSize);
+    void setState(RiftRecord& record, RiftState state, const std::string& reason);
+    void note(RiftRecord& record);
 
     double resolution_;
     int maxAttempts_;
@@ -98,6 +105,8 @@ class RiftLedger {
     };
     std::map<std::uint64_t, RiftRecord> records_;
     std::unordered_map<std::uint64_t, std::vector<RiftRecord*>> byBlock_;
+    std::vector<RiftRecord*> changed_;
+    std::array<std::size_t, kRiftStates> counts_{};
     Tries unmatched_;                                            ///< of tears without a match
     std::unordered_map<std::uint64_t, Tries> unmatchedByBlock_;  ///< the same
 };

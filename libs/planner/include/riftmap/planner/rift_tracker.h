@@ -8,26 +8,15 @@
 #include <map>
 #include <set>
 #include <string>
-#include <utility>
+#include <unordered_map>
 #include <vector>
 
 #include "riftmap/planner/rift_ledger.h"
 
 namespace riftmap {
 
-/// A connected piece of what is torn: cells of one state that touch each other, by a face, an edge
-/// or a corner.
-struct CellGroup {
-    RiftState state = RiftState::kOpen;
-    std::vector<std::uint64_t> cells;  ///< keys, ascending; at least one
-};
-
-/// All records that are not resolved, by group; in the order of their first cells. O(n log n).
-using RiftRecords = std::map<std::uint64_t, RiftRecord>;
-std::vector<CellGroup> connectedCells(const RiftRecords& records);
-
 /// A rift over the whole run: one line of the certificate. Map frame, metres. What is said of size
-/// and place is as it was in the last view that had it.
+/// and place is as it was in the last view that had it. Its cells are the ledger's records.
 struct TrackedRift {
     std::uint32_t id = 0;  ///< in the order of appearance
     RiftState state = RiftState::kOpen;
@@ -39,14 +28,17 @@ struct TrackedRift {
     double rim = 0;                                    ///< length of what is torn, about [m]
     double coarse = 0;  ///< area sampled too sparsely or known too badly, about [m^2]
     std::size_t openVertices = 0, highEdges = 0;
-    std::vector<std::uint64_t> cells;         ///< ascending
-    std::size_t firstView = 0, lastView = 0;  ///< from 0
-    std::set<std::size_t> tries;              ///< views that were to close some of it
-    std::set<std::uint32_t> parents;          ///< rifts that it split off
-    std::set<std::uint32_t> joined;           ///< rifts that have become part of it
+    std::vector<const RiftRecord*> cells;  ///< ascending in key
+    std::size_t firstView = 0;             ///< from 0
+    std::size_t closedAfter = 0;           ///< once it is resolved: the last view that had it
+    std::set<std::size_t> tries;           ///< views that were to close some of it
+    std::set<std::uint32_t> parents;       ///< rifts that it split off
+    std::set<std::uint32_t> joined;        ///< rifts that have become part of it
 };
 
-/// Follows rifts from view to view as they shrink, split and join. Each rift lives on in the group
+/// Follows rifts from view to view as they shrink, split and join. A group is a connected piece of
+/// what is torn: cells of one state that touch each other, by a face, an edge or a corner; groups
+/// are named in the order of their first keys. Each rift lives on in the group
 /// that holds most of its cells. Where several live on in one group, it keeps the oldest id and the
 /// others have joined it. A group in which none lives on, but which holds cells of some, has split
 /// off those. So every id that ever was is either a rift's or in one rift's `joined`. A rift
@@ -56,27 +48,51 @@ class RiftTracker {
     /// `cellSize` of the summary that the records are of [m].
     explicit RiftTracker(double cellSize) : cellSize_(cellSize) {}
 
-    /// `records` of the ledger after it has taken in this view, which was to close the cells
-    /// `aimedAt` (keys). O(n log n) in the records.
-    void update(std::size_t view, const RiftRecords& records,
+    /// `changed`: what the ledger has written since the last update (RiftLedger::takeChanged()),
+    /// after it has taken in this view, which was to close the cells `aimedAt` (keys). The records
+    /// must stay where they are. Only the rifts of cells that changed, and those that such cells
+    /// come to touch, are looked at: O(n log n) in their cells.
+    void update(std::size_t view, const std::vector<const RiftRecord*>& changed,
                 const std::vector<std::uint64_t>& aimedAt);
 
     /// By id.
     const std::map<std::uint32_t, TrackedRift>& rifts() const { return rifts_; }
-    std::array<std::size_t, kRiftStates> counts() const;
-    /// The rift of each cell that is torn, by key.
-    const std::map<std::uint64_t, std::uint32_t>& owners() const { return owners_; }
+    /// Of rifts, by state.
+    const std::array<std::size_t, kRiftStates>& counts() const { return counts_; }
+    /// The last view that had this rift.
+    std::size_t lastView(const TrackedRift& rift) const {
+        return rift.state == RiftState::kResolved ? rift.closedAfter : view_;
+    }
+    /// The rift of each cell that is torn, by the cell's key.
+    const std::unordered_map<std::uint64_t, std::uint32_t>& owners() const { return owners_; }
 
  private:
+    struct Cell {
+        const RiftRecord* record;
+        std::uint32_t owner;  ///< rift that it was of, or kNone
+    };
+    struct Group {
+        RiftState state = RiftState::kOpen;
+        std::vector<Cell> cells;  ///< ascending in key; at least one
+    };
+    static constexpr std::uint32_t kNone = ~std::uint32_t{0};
+    static std::vector<Group> connected(const std::vector<Cell>& cells);
+
     void noteTries(std::size_t view, const std::vector<std::uint64_t>& aimedAt);
+    std::set<std::uint32_t> affectedBy(const std::vector<const RiftRecord*>& changed) const;
+    std::vector<Cell> tornOf(const std::set<std::uint32_t>& affected,
+                             const std::vector<const RiftRecord*>& changed) const;
     std::uint32_t nameOf(const std::set<std::uint32_t>& heirTo,
                          const std::map<std::uint32_t, std::size_t>& shared, std::size_t view);
-    void describe(TrackedRift& rift, const CellGroup& group, const RiftRecords& records) const;
+    void setState(TrackedRift& rift, RiftState state);
+    void describe(TrackedRift& rift, const Group& group);
 
     double cellSize_;
     std::uint32_t nextId_ = 0;
+    std::size_t view_ = 0;  ///< of the last update
     std::map<std::uint32_t, TrackedRift> rifts_;
-    std::map<std::uint64_t, std::uint32_t> owners_;
+    std::array<std::size_t, kRiftStates> counts_{};
+    std::unordered_map<std::uint64_t, std::uint32_t> owners_;
 };
 
 }  // namespace riftmap

@@ -37,7 +37,8 @@ struct ExploreStep {
     double newArea = 0;         ///< that came true, see SurfaceSummary::newArea() [m^2]
     double wellKnownArea = 0;   ///< surface that is as fine and accurate as asked since [m^2]
     double pathLength = 0;      ///< so far [m]
-    double grabMs = 0, stereoMs = 0, mergeMs = 0, riftsMs = 0;
+    double grabMs = 0, stereoMs = 0, mergeMs = 0;
+    double riftsMs = 0;      ///< finding the rifts and following them from the view before
     double knowledgeMs = 0;  ///< keeping the planner's picture of the map up to date
     double planMs = 0;       ///< choice of this view, with knowledgeMs of the view before
     double seconds = 0;      ///< since the start

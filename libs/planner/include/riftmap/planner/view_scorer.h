@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -61,10 +62,17 @@ class ViewScorer {
     ViewScorer(const SensorModel& sensor, const SurfaceSummary& summary, const RiftLedger& ledger,
                const FreeSpace& space, double resolution, const Weights& weights);
 
-    ViewScore score(const Pose& world_T_camera) const;
+    /// What hides what from a pose: drawn once for an estimate and a score.
+    struct Drawing;
+    std::shared_ptr<const Drawing> draw(const Pose& world_T_camera) const;
+
+    ViewScore score(const Pose& world_T_camera, const Drawing& drawing) const;
+    ViewScore score(const Pose& world_T_camera) const {
+        return score(world_T_camera, *draw(world_T_camera));
+    }
     /// The same from a sample of the open cells where there are many (samples()), so that its time
     /// does not grow with them; `cells` holds those of the sample.
-    ViewScore estimate(const Pose& world_T_camera) const;
+    ViewScore estimate(const Pose& world_T_camera, const Drawing& drawing) const;
     bool samples() const { return open_.size() > kMostOpen; }
     /// Unknown places that the view would look into.
     std::vector<Eigen::Vector3d> unknownSeen(const Pose& world_T_camera) const;
@@ -119,7 +127,8 @@ class ViewScorer {
     static constexpr std::size_t kMostOpen = 6000;  ///< open cells that an estimate weighs
 
     Benefit benefit(const RiftRecord& record, const Pose& world_T_camera, bool withLines) const;
-    ViewScore scoreEvery(std::size_t stride, int rayStride, const Pose& world_T_camera) const;
+    ViewScore scoreEvery(std::size_t stride, int rayStride, const Pose& world_T_camera,
+                         const Drawing& drawing) const;
 
     struct BlockView {
         Eigen::Vector3f centre;
@@ -136,7 +145,6 @@ class ViewScorer {
     using Points = decltype(SurfaceSummary::Block::positions);
 
     void groupBlocks();
-    DepthBuffer draw(const Pose& camera_T_world, std::vector<const BlockView*>& seen) const;
     double newSurfaceShare(double distance) const;
     double besideRim(const SurfaceCell& cell) const;
     double nearShareOf(const DepthBuffer& buffer) const;
