@@ -194,12 +194,7 @@ EvalProgram::Map EvalProgram::readMap() const {
         if (!rawlog_.empty()) {
             out.surface = surfaceOf(graph);
         }
-        out.rifts.emplace();
-        for (const Rift& rift : graph.rifts()) {
-            for (const VertexId id : rift.vertices) {
-                out.rifts->push_back(graph.position(id));
-            }
-        }
+        out.rifts = rimsOf(graph);
     };
     if (map_.extension() == ".pixelgraph") {
         const PixelGraphMap map = loadMap(map_);

@@ -12,6 +12,7 @@
 #include "riftmap/apps/explore_report.h"
 #include "riftmap/apps/pictures.h"
 #include "riftmap/core/file.h"
+#include "riftmap/eval/map_surface.h"
 #include "riftmap/planner/paper_view_planner.h"
 
 namespace riftmap {
@@ -408,12 +409,9 @@ YamlMap ExploreRun::figures(const std::string& error) {
         summary.set("error", error);
     }
     if (judge_ && !history_.empty()) {
-        std::vector<Eigen::Vector3f> rims;
+        const std::vector<Eigen::Vector3f> rims = rimsOf(map_.graph());
         std::vector<Eigen::Vector3f> verdicts;
         for (const auto& [key, r] : explorer_->knowledge().ledger().records()) {
-            if (r.state != RiftState::kResolved) {
-                rims.push_back(r.cell.openPosition);
-            }
             if (r.state == RiftState::kUnreachable || r.state == RiftState::kUnobservable) {
                 verdicts.push_back(r.cell.openPosition);
             }

@@ -48,4 +48,14 @@ MapSurface surfaceOf(const PixelGraph& graph) {
     return out;
 }
 
+std::vector<Eigen::Vector3f> rimsOf(const PixelGraph& graph) {
+    std::vector<Eigen::Vector3f> rims;
+    for (const Rift& rift : graph.rifts()) {
+        for (const VertexId id : rift.vertices) {
+            rims.push_back(graph.position(id));
+        }
+    }
+    return rims;
+}
+
 }  // namespace riftmap

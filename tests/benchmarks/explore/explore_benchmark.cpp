@@ -125,7 +125,8 @@ std::vector<Run> runs(const std::string& keep) {
         }
     }
     for (const World& w : worlds()) {
-        const bool compared = w.name == "room" || w.name == "rooms" || w.name == "bunny";
+        const bool compared =
+            w.name == "room" || w.name == "rooms" || w.name == "bunny" || w.name == "dragon";
         for (int start = 0; compared && start < 3; ++start) {
             add(w, "N0", "paper", start);
             add(w, "N0", w.object ? "sphere" : "octomap_frontier", start);

@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "riftmap/apps/build_program.h"
+#include "riftmap/apps/eval_program.h"
 #include "riftmap/apps/explore_program.h"
 #include "riftmap/core/csv.h"
 #include "riftmap/core/file.h"
@@ -367,6 +368,29 @@ TEST(Explore, endsByItselfWithAnObjectCovered) {
     EXPECT_LE(program.views, 60U);
     EXPECT_GE(program.coverage.at.front().cObs, 0.95);
     EXPECT_GE(program.coverage.at.front().accuracy, 0.99);
+}
+
+TEST(Explore, saysOfTheRunWhatTheJudgeSaysOfItsMap) {
+    const TemporaryFolder folder;
+    const std::string run = (folder / "run").string();
+    ExploreProgram program;
+    ASSERT_EQ(
+        runProgram(program,
+                   Arguments{kConfig + "explore-sculpture.ini", "--set", "Noise.level=N0", "--set",
+                             "Graph.target_resolution=0.04", "--set", "Graph.gamma=0.01", "--set",
+                             "Eval.deltas=0.04", "--set", "Eval.headline=0.04", "--set",
+                             "Eval.samples=20000", "--set", "Stop.max_views=3", "--out", run} +
+                       kSmallCamera),
+        0);
+    EvalProgram judge;
+    ASSERT_EQ(runProgram(judge, {run + "/config_used.ini", "--map", run + "/map.pixelgraph",
+                                 "--no-progress", "--out", (folder / "judged").string()}),
+              0);
+    EXPECT_GT(program.coverage.explained, 0.5);
+    EXPECT_EQ(program.coverage.explained, judge.report.explained);
+    EXPECT_EQ(program.coverage.at.front().cObs, judge.report.at.front().cObs);
+    EXPECT_EQ(program.coverage.at.front().accuracy, judge.report.at.front().accuracy);
+    EXPECT_EQ(program.coverage.verdicts, judge.report.verdicts);
 }
 
 }  // namespace

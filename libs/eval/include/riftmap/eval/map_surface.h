@@ -26,4 +26,7 @@ struct MapSurface {
 /// stands for itself. O(edges).
 MapSurface surfaceOf(const PixelGraph& graph);
 
+/// Places of the vertices of all rifts [m]: the rims that the coverage protocol calls listed.
+std::vector<Eigen::Vector3f> rimsOf(const PixelGraph& graph);
+
 }  // namespace riftmap
