@@ -389,14 +389,14 @@ void ExploreRun::writeCells() const {
                      "open_vertices", "edges", "attempts", "rim_m", "coarse_m2", "hidden_m2"});
     const auto& owners = explorer_->rifts().owners();
     for (const auto& [key, r] : explorer_->knowledge().ledger().records()) {
-        const auto rift = owners.find(key);
-        if (rift == owners.end()) {
+        if (r.state == RiftState::kResolved) {
             continue;
         }
         const SurfaceCell& c = r.cell;
-        table.row({rift->second, nameOf(r.state), r.reason, kindNames(c.kinds), c.openPosition.x(),
-                   c.openPosition.y(), c.openPosition.z(), c.normal.x(), c.normal.y(), c.normal.z(),
-                   c.open, c.highEdges, r.attempts.size(), c.rim, c.coarse, c.hidden});
+        table.row({owners.at(key), nameOf(r.state), r.reason, kindNames(c.kinds),
+                   c.openPosition.x(), c.openPosition.y(), c.openPosition.z(), c.normal.x(),
+                   c.normal.y(), c.normal.z(), c.open, c.highEdges, r.attempts.size(), c.rim,
+                   c.coarse, c.hidden});
     }
 }
 

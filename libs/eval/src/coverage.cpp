@@ -201,8 +201,10 @@ CoverageReport CoverageJudge::evaluate(std::span<const Eigen::Vector3f> vertices
     // One must be able to step from sample to sample: farther where they are sparse.
     const double step = 2 * std::sqrt(meshArea_ / static_cast<double>(report.samples));
     const std::vector<float> distances = sampleDistances(vertices);
-    if (rifts != nullptr) {
-        report.explained = explainedShare(distances, headline_, *rifts, std::max(kReach, step));
+    const double reach = std::max(kReach, step);
+    // A rim is a vertex of the map, and what is uncovered has none within the headline distance.
+    if (rifts != nullptr && reach > headline_) {
+        report.explained = explainedShare(distances, headline_, *rifts, reach);
     }
     report.verdicts = verdicts.size();
     const auto right = trueVerdicts(distances, headline_, verdicts, std::max(kBeside, step));

@@ -110,7 +110,11 @@ void RiftLedger::update(const SurfaceSummary& summary) {
                 updateCell(cell, summary.cellSize());
             }
         }
-        for (RiftRecord* r : inBlock(blockKey)) {
+        const auto torn = byBlock_.find(blockKey);
+        if (torn == byBlock_.end()) {
+            continue;
+        }
+        for (RiftRecord* r : torn->second) {
             if (r->state != RiftState::kResolved && summary.find(r->cell.key) == nullptr) {
                 setState(*r, RiftState::kResolved, "seen through");
             }
@@ -118,10 +122,10 @@ void RiftLedger::update(const SurfaceSummary& summary) {
     }
 }
 
-const std::vector<RiftRecord*>& RiftLedger::inBlock(std::uint64_t block) const {
-    static const std::vector<RiftRecord*> kNone;
+std::span<const RiftRecord* const> RiftLedger::inBlock(std::uint64_t block) const {
     const auto it = byBlock_.find(block);
-    return it == byBlock_.end() ? kNone : it->second;
+    return it == byBlock_.end() ? std::span<const RiftRecord* const>()
+                                : std::span<const RiftRecord* const>(it->second);
 }
 
 std::vector<TriedTear> RiftLedger::tears(const std::vector<std::uint64_t>& keys,

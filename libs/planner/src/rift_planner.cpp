@@ -220,7 +220,7 @@ void Choice::scoreFrom(std::size_t first) {
     parallelForEach(candidates_.size() - first, 4, [&](std::size_t i) {
         Candidate& c = candidates_[first + i];
         rate(c, k_.surfaceBox() ? scoreAround(c.pose)
-                : c.drawing     ? scorer_.score(c.pose, *c.drawing)
+                : c.drawing     ? scorer_.score(*c.drawing)
                                 : scorer_.score(c.pose));
         c.drawing.reset();
     });
@@ -236,7 +236,7 @@ void Choice::preselect() {
     parallelForEach(candidates_.size(), 4, [&](std::size_t i) {
         Candidate& c = candidates_[i];
         c.drawing = scorer_.draw(c.pose);
-        rate(c, scorer_.estimate(c.pose, *c.drawing));
+        rate(c, scorer_.estimate(*c.drawing));
     });
     std::stable_sort(candidates_.begin(), candidates_.end(),
                      [](const Candidate& a, const Candidate& b) { return a.utility > b.utility; });

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <memory>
 #include <optional>
 #include <random>
 #include <vector>
@@ -15,8 +16,9 @@ struct Candidate {
     Pose pose;
     double path = 0;  ///< [m]
     ViewScore score;
-    double utility = 0;                                            ///< gain for a metre
-    std::shared_ptr<const ViewScorer::Drawing> drawing = nullptr;  ///< until it is scored
+    double utility = 0;  ///< gain for a metre
+    std::shared_ptr<const ViewScorer::Drawing> drawing =
+        nullptr;  ///< of its estimate, until it is scored
 };
 
 /// A unit vector at a right angle to `n`.

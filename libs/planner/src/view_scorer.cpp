@@ -36,6 +36,7 @@ struct ViewScorer::DepthBuffer {
 };
 
 struct ViewScorer::Drawing {
+    Pose world_T_camera;
     DepthBuffer buffer;
     std::vector<const BlockView*> seen;  ///< those in sight, in the blocks' own order
 };
@@ -234,6 +235,7 @@ ViewScorer::Benefit ViewScorer::benefit(const RiftRecord& record, const Pose& wo
 std::shared_ptr<const ViewScorer::Drawing> ViewScorer::draw(const Pose& world_T_camera) const {
     const StereoCamera& c = sensor_.camera;
     const auto drawing = std::make_shared<Drawing>();
+    drawing->world_T_camera = world_T_camera;
     DepthBuffer& b = drawing->buffer;
     std::vector<const BlockView*>& seen = drawing->seen;
     b.width = std::max(1, c.width / kPixels);
@@ -340,20 +342,19 @@ bool ViewScorer::visible(const DepthBuffer& buffer, const Eigen::Vector3f& inCam
     return depth && *depth >= inCamera.z() - slack;
 }
 
-ViewScore ViewScorer::estimate(const Pose& world_T_camera, const Drawing& drawing) const {
-    return scoreEvery((open_.size() + kMostOpen - 1) / kMostOpen, 2 * kRayStride, world_T_camera,
-                      drawing);
+ViewScore ViewScorer::estimate(const Drawing& drawing) const {
+    return scoreEvery((open_.size() + kMostOpen - 1) / kMostOpen, 2 * kRayStride, drawing);
 }
 
-ViewScore ViewScorer::score(const Pose& world_T_camera, const Drawing& drawing) const {
-    return scoreEvery(1, kRayStride, world_T_camera, drawing);
+ViewScore ViewScorer::score(const Drawing& drawing) const {
+    return scoreEvery(1, kRayStride, drawing);
 }
 
 /// Weighs one open cell in `stride` for as many, and one ray in `rayStride` along both axes.
-ViewScore ViewScorer::scoreEvery(std::size_t stride, int rayStride, const Pose& world_T_camera,
-                                 const Drawing& drawing) const {
+ViewScore ViewScorer::scoreEvery(std::size_t stride, int rayStride, const Drawing& drawing) const {
     stride = std::max<std::size_t>(stride, 1);
     ViewScore result;
+    const Pose& world_T_camera = drawing.world_T_camera;
     const Pose camera_T_world = world_T_camera.inverse();
     const DepthBuffer& buffer = drawing.buffer;
     result.nearShare = nearShareOf(buffer);

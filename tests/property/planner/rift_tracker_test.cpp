@@ -41,7 +41,9 @@ Changed write(const Tears& tears, Records& records) {
         r.reason = std::string("is ") + nameOf(state);
         r.cell.key = keyOf(index);
         r.cell.open = 3;
-        r.cell.rim = isNew ? 0.05F : r.cell.rim;
+        if (isNew) {
+            r.cell.rim = 0.05F;
+        }
         r.cell.openPosition =
             (Eigen::Vector3f(static_cast<float>(index[0]), static_cast<float>(index[1]),
                              static_cast<float>(index[2])) +
@@ -145,6 +147,36 @@ TEST_F(RiftTrackerByHand, cornersTouchAndGapsDoNot) {
     EXPECT_EQ(at(0), tracker.owners().at(keyOf({-1, 1, -1})));
     EXPECT_NE(at(0), at(2));
     EXPECT_NEAR(rift(at(0)).extent, 0.2, 1e-9);
+}
+
+/// What was not told of is not looked at: time goes with what a view changed.
+TEST_F(RiftTrackerByHand, farRiftsAreLeftAlone) {
+    see(row(-5, -3) + row(2, 4));
+    const double rim = rift(at(4)).rim;
+    records.at(keyOf({4, 0, 0})).cell.rim = 7;
+    see(row(-5, -2) + row(2, 4));
+    EXPECT_EQ(rift(at(-2)).cells.size(), 4U);
+    EXPECT_EQ(rift(at(4)).rim, rim);
+    EXPECT_EQ(lastView(at(4)), 1U);
+    see(row(-5, -2) + row(2, 5));
+    EXPECT_GT(rift(at(4)).rim, 7.0);
+}
+
+TEST_F(RiftTrackerByHand, aRiftIsDescribedByItsCells) {
+    Tears tears = row(0, 1);
+    write(tears, records);
+    for (const int x : {0, 1}) {
+        SurfaceCell& cell = records.at(keyOf({x, 0, 0})).cell;
+        cell.kinds = x == 0 ? kNoMatch : kDepthStep;
+        cell.coarse = 0.25F;
+        cell.highEdges = 2;
+        cell.openNormal = Eigen::Vector3f(x == 0 ? 1.0F : -1.0F, 0, 1);
+    }
+    tracker.update(0, {&records.at(keyOf({0, 0, 0})), &records.at(keyOf({1, 0, 0}))}, {});
+    EXPECT_EQ(rift(0).kinds, kNoMatch | kDepthStep);
+    EXPECT_EQ(rift(0).coarse, 0.5);
+    EXPECT_EQ(rift(0).highEdges, 4U);
+    EXPECT_EQ(rift(0).normal, Eigen::Vector3f(0, 0, 1));
 }
 
 TEST_F(RiftTrackerByHand, theCentreLiesInTheTear) {

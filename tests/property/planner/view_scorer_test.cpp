@@ -225,8 +225,8 @@ TEST_P(ScorerTwin, seesTheCellsThatNothingHides) {
         EXPECT_GE(score.openGain, sure - 1e-9);
         EXPECT_LE(score.openGain, possible + 1e-9);
         // With so few cells the estimate leaves none out.
-        EXPECT_EQ(scorer.estimate(pose, *scorer.draw(pose)).openGain, score.openGain);
-        EXPECT_EQ(scorer.estimate(pose, *scorer.draw(pose)).cells, score.cells);
+        EXPECT_EQ(scorer.estimate(*scorer.draw(pose)).openGain, score.openGain);
+        EXPECT_EQ(scorer.estimate(*scorer.draw(pose)).cells, score.cells);
     }
     EXPECT_FALSE(scorer.samples());
     EXPECT_GT(seen, 500U);
@@ -248,7 +248,7 @@ TEST_P(ScorerTwin, anEstimateIsTheSumOfASample) {
     for (int i = 0; i < 4; ++i) {
         const Pose pose = watched.anyPose();
         const ViewScore score = scorer.score(pose);
-        const ViewScore estimate = scorer.estimate(pose, *scorer.draw(pose));
+        const ViewScore estimate = scorer.estimate(*scorer.draw(pose));
         const SlowSight slow(watched, pose);
         double sure = 0;
         double possible = 0;

@@ -150,6 +150,28 @@ TEST_F(SphereJudge, ARiftExplainsTheHoleItLiesOn) {
     EXPECT_EQ(judge_.explainedShare(distances, 0.005, {{0.4F, rim, 0}, {-0.4F, rim, 0}}), 1.0);
     EXPECT_EQ(judge_.explainedShare(distances, 0.005, {{0, 0.5F, 0}}), 0.0) << "not on a rim";
     EXPECT_EQ(judge_.explainedShare(judge_.sampleDistances(map_.points), 0.005, {}), 1.0);
+    EXPECT_EQ(judge_.evaluate(open, {}, &open).explained, 1.0);
+}
+
+TEST_F(SphereJudge, WhatNoRimCanExplainIsNotTold) {
+    EvalOptions options;
+    options.deltas = {0.03, 0.06};
+    Points half;
+    for (const auto& p : map_.points) {
+        if (p.x() < 0) {
+            half.push_back(p);
+        }
+    }
+    for (const double headline : options.deltas) {
+        options.headline = headline;
+        const CoverageJudge judge(mesh_, caster_, space(), options);
+        const double explained = judge.evaluate(half, {}, &half).explained;
+        if (headline < 0.05) {
+            EXPECT_EQ(explained, 1.0);
+        } else {  // the vertices are 6 cm and more from what is uncovered, and 5 are asked for
+            EXPECT_TRUE(std::isnan(explained));
+        }
+    }
 }
 
 TEST(SurfaceSamples, AreEvenByAreaAndTheSameEveryTime) {

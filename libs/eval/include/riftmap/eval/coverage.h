@@ -41,8 +41,9 @@ struct CoverageReport {
     double errorMedian = std::numeric_limits<double>::quiet_NaN();  ///< vertex to mesh
     double errorP95 = std::numeric_limits<double>::quiet_NaN();
     double errorMean = std::numeric_limits<double>::quiet_NaN();
-    /// Share of the uncovered observable samples that the listed rifts explain; NaN without a list,
-    /// 1 where nothing is uncovered.
+    /// Share of the uncovered observable samples that the listed rifts explain; 1 where nothing is
+    /// uncovered. NaN without a list, and where the headline distance is not below the reach of
+    /// 5 cm (or two spacings of the samples): no rim of the map can lie so near.
     double explained = std::numeric_limits<double>::quiet_NaN();
     /// Share of the verdicts "no camera can close this tear" that are true (trueVerdicts());
     /// NaN without such verdicts.

@@ -26,7 +26,8 @@ struct MapSurface {
 /// stands for itself. O(edges).
 MapSurface surfaceOf(const PixelGraph& graph);
 
-/// Places of the vertices of all rifts [m]: the rims that the coverage protocol calls listed.
+/// Places of the vertices of all rifts [m]: the rims that the coverage protocol calls listed. Calls
+/// PixelGraph::rifts(), which counts as writing; else O(vertices of rifts).
 std::vector<Eigen::Vector3f> rimsOf(const PixelGraph& graph);
 
 }  // namespace riftmap

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <map>
+#include <span>
 #include <string>
 #include <unordered_map>
 #include <vector>
@@ -59,6 +60,8 @@ class RiftLedger {
  public:
     /// `resolution` [m]: tears shorter than about this do not count. `maxAttempts` >= 1.
     RiftLedger(double resolution, int maxAttempts);
+    RiftLedger(const RiftLedger&) = delete;  // who was given records points to them
+    RiftLedger& operator=(const RiftLedger&) = delete;
 
     /// Reads the cells that changed.
     void update(const SurfaceSummary& summary);
@@ -83,10 +86,10 @@ class RiftLedger {
     float tear(const SurfaceCell& cell, double cellSize) const;
     /// By key; none is ever removed, and each stays where it is.
     const std::map<std::uint64_t, RiftRecord>& records() const { return records_; }
-    /// The records written since the last call, ascending in key.
+    /// The records whose cell, state or reason was written since the last call, ascending in key.
     std::vector<const RiftRecord*> takeChanged();
     /// Those of the cells in one block of the summary, ascending in key.
-    const std::vector<RiftRecord*>& inBlock(std::uint64_t block) const;
+    std::span<const RiftRecord* const> inBlock(std::uint64_t block) const;
     /// Of records, by state.
     const std::array<std::size_t, kRiftStates>& counts() const { return counts_; }
     /// Share of the area seen again that a vain try from here repeats: true if some attempt looked

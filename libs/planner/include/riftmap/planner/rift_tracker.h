@@ -16,7 +16,8 @@
 namespace riftmap {
 
 /// A rift over the whole run: one line of the certificate. Map frame, metres. What is said of size
-/// and place is as it was in the last view that had it. Its cells are the ledger's records.
+/// and place is as it was in the last view that had it; its cells are the ledger's records, which
+/// go on (once it is resolved they may be torn again and another rift's).
 struct TrackedRift {
     std::uint32_t id = 0;  ///< in the order of appearance
     RiftState state = RiftState::kOpen;
@@ -38,20 +39,21 @@ struct TrackedRift {
 
 /// Follows rifts from view to view as they shrink, split and join. A group is a connected piece of
 /// what is torn: cells of one state that touch each other, by a face, an edge or a corner; groups
-/// are named in the order of their first keys. Each rift lives on in the group
-/// that holds most of its cells. Where several live on in one group, it keeps the oldest id and the
-/// others have joined it. A group in which none lives on, but which holds cells of some, has split
-/// off those. So every id that ever was is either a rift's or in one rift's `joined`. A rift
-/// without cells is resolved; torn again, it is a new one. Not thread-safe.
+/// are named in the order of their first keys. Each rift lives on in the group that holds most of
+/// its cells. Where several live on in one group, it keeps the oldest id and the others have joined
+/// it. A group in which none lives on, but which holds cells of some, has split off those. So every
+/// id that ever was is either a rift's or in one rift's `joined`. A rift without cells is resolved;
+/// torn again, it is a new one. Points to the ledger's records, which must outlive it. Not
+/// thread-safe.
 class RiftTracker {
  public:
     /// `cellSize` of the summary that the records are of [m].
     explicit RiftTracker(double cellSize) : cellSize_(cellSize) {}
 
     /// `changed`: what the ledger has written since the last update (RiftLedger::takeChanged()),
-    /// after it has taken in this view, which was to close the cells `aimedAt` (keys). The records
-    /// must stay where they are. Only the rifts of cells that changed, and those that such cells
-    /// come to touch, are looked at: O(n log n) in their cells.
+    /// in any order, after it has taken in this view, which was to close the cells `aimedAt`
+    /// (keys). More than that does no harm. Only the rifts of cells that changed, and those that
+    /// such cells come to touch, are looked at, each as a whole: O(n log n) in their cells.
     void update(std::size_t view, const std::vector<const RiftRecord*>& changed,
                 const std::vector<std::uint64_t>& aimedAt);
 

@@ -33,7 +33,8 @@ struct ViewScore {
 };
 
 /// Predicts views: the cells of the summary are drawn into a small depth image, which hides what
-/// lies behind them; then open cells and unknown space are counted. score() is thread-safe.
+/// lies behind them; then open cells and unknown space are counted. draw(), score() and estimate()
+/// are thread-safe.
 class ViewScorer {
  public:
     struct Weights {
@@ -62,17 +63,16 @@ class ViewScorer {
     ViewScorer(const SensorModel& sensor, const SurfaceSummary& summary, const RiftLedger& ledger,
                const FreeSpace& space, double resolution, const Weights& weights);
 
-    /// What hides what from a pose: drawn once for an estimate and a score.
+    /// What hides what from a pose; good for any number of estimates and scores. Of this scorer,
+    /// which must outlive it.
     struct Drawing;
     std::shared_ptr<const Drawing> draw(const Pose& world_T_camera) const;
 
-    ViewScore score(const Pose& world_T_camera, const Drawing& drawing) const;
-    ViewScore score(const Pose& world_T_camera) const {
-        return score(world_T_camera, *draw(world_T_camera));
-    }
+    ViewScore score(const Drawing& drawing) const;
+    ViewScore score(const Pose& world_T_camera) const { return score(*draw(world_T_camera)); }
     /// The same from a sample of the open cells where there are many (samples()), so that its time
     /// does not grow with them; `cells` holds those of the sample.
-    ViewScore estimate(const Pose& world_T_camera, const Drawing& drawing) const;
+    ViewScore estimate(const Drawing& drawing) const;
     bool samples() const { return open_.size() > kMostOpen; }
     /// Unknown places that the view would look into.
     std::vector<Eigen::Vector3d> unknownSeen(const Pose& world_T_camera) const;
@@ -127,8 +127,7 @@ class ViewScorer {
     static constexpr std::size_t kMostOpen = 6000;  ///< open cells that an estimate weighs
 
     Benefit benefit(const RiftRecord& record, const Pose& world_T_camera, bool withLines) const;
-    ViewScore scoreEvery(std::size_t stride, int rayStride, const Pose& world_T_camera,
-                         const Drawing& drawing) const;
+    ViewScore scoreEvery(std::size_t stride, int rayStride, const Drawing& drawing) const;
 
     struct BlockView {
         Eigen::Vector3f centre;
