@@ -7,6 +7,8 @@
 #include <limits>
 #include <map>
 
+#include "riftmap/core/parallel.h"
+
 namespace riftmap {
 
 namespace {
@@ -117,6 +119,13 @@ ViewScorer::ViewScorer(const SensorModel& sensor, const SurfaceSummary& summary,
         blocks_.push_back(b);
     }
     groupBlocks();
+    openCells_.resize(open_.size());
+    parallelForEach(open_.size(), 256, [&](std::size_t i) {
+        const SurfaceCell& cell = open_[i]->cell;
+        openCells_[i] = {cell.openPosition,
+                         cell.hidden > 0 ? cell.hiddenPosition : cell.openPosition,
+                         leftAfterTries(*open_[i])};
+    });
 }
 
 void ViewScorer::groupBlocks() {
@@ -174,11 +183,11 @@ bool ViewScorer::openTo(const SurfaceCell& cell, const Pose& world_T_camera) con
 
 ViewScorer::Benefit ViewScorer::benefit(const RiftRecord& record,
                                         const Pose& world_T_camera) const {
-    return benefit(record, world_T_camera, true);
+    return benefit(record, leftAfterTries(record), world_T_camera, true);
 }
 
-ViewScorer::Benefit ViewScorer::benefit(const RiftRecord& record, const Pose& world_T_camera,
-                                        bool withLines) const {
+ViewScorer::Benefit ViewScorer::benefit(const RiftRecord& record, double vain,
+                                        const Pose& world_T_camera, bool withLines) const {
     const Eigen::Vector3d& eye = world_T_camera.translation;
     if (RiftLedger::tried(record, eye)) {
         return {};
@@ -218,7 +227,6 @@ ViewScorer::Benefit ViewScorer::benefit(const RiftRecord& record, const Pose& wo
     // view measures well.
     const double torn = newSurfaceShare(distance);
     const double coarse = std::clamp((1.6 * goodDepth_ - distance) / (0.6 * goodDepth_), 0.0, 1.0);
-    const double vain = leftAfterTries(record);
     const double tornArea =
         weights_.hidden * static_cast<double>(record.cell.hidden) + besideRim(record.cell);
     const double coarseArea = weights_.coarse * static_cast<double>(record.cell.coarse);
@@ -364,13 +372,13 @@ ViewScore ViewScorer::scoreEvery(std::size_t stride, int rayStride, const Drawin
     for (const BlockView* block : drawing.seen) {
         const std::size_t first = (block->firstOpen + stride - 1) / stride * stride;
         for (std::size_t i = first; i < block->lastOpen; i += stride) {
-            const RiftRecord& record = *open_[i];
             const Eigen::Vector3f p =
-                (camera_T_world * record.cell.openPosition.cast<double>()).cast<float>();
+                (camera_T_world * openCells_[i].open.cast<double>()).cast<float>();
             if (!visible(buffer, p, static_cast<float>(2.0 * cell))) {
                 continue;
             }
-            const Benefit b = benefit(record, world_T_camera);
+            const RiftRecord& record = *open_[i];
+            const Benefit b = benefit(record, openCells_[i].vain, world_T_camera, true);
             if (b.area <= 0) {
                 continue;
             }
@@ -467,17 +475,15 @@ ViewScorer::Seen ViewScorer::sightsAtMost(const Pose& world_T_camera) const {
     const auto margin = static_cast<float>(2.0 * summary_->cellSize());
     for (const BlockView* block : drawing->seen) {
         for (std::size_t i = block->firstOpen; i < block->lastOpen; ++i) {
-            const SurfaceCell& cell = open_[i]->cell;
-            const Eigen::Vector3f p =
-                rotation * (cell.hidden > 0 ? cell.hiddenPosition : cell.openPosition) +
-                translation;
+            const Eigen::Vector3f p = rotation * openCells_[i].wanted + translation;
             const std::optional<float> depth = drawnAt(buffer, p);
             if (!depth) {
                 continue;
             }
+            const SurfaceCell& cell = open_[i]->cell;
             const bool inSight = *depth >= p.z() - margin;
             if (inSight || (weights_.gapsByLine && cell.hidden > 0)) {
-                const Benefit b = benefit(*open_[i], world_T_camera, false);
+                const Benefit b = benefit(*open_[i], openCells_[i].vain, world_T_camera, false);
                 const std::size_t count = result.sights.size();
                 put(2 * i, b.torn);
                 if (cell.hidden > 0 && result.sights.size() > count) {

@@ -126,9 +126,16 @@ class ViewScorer {
  private:
     static constexpr std::size_t kMostOpen = 6000;  ///< open cells that an estimate weighs
 
-    Benefit benefit(const RiftRecord& record, const Pose& world_T_camera, bool withLines) const;
+    Benefit benefit(const RiftRecord& record, double vain, const Pose& world_T_camera,
+                    bool withLines) const;
     ViewScore scoreEvery(std::size_t stride, int rayStride, const Drawing& drawing) const;
 
+    /// What every candidate asks of an open cell, side by side: records lie anywhere in memory.
+    struct OpenCell {
+        Eigen::Vector3f open;    ///< its openPosition
+        Eigen::Vector3f wanted;  ///< what is to be seen: the place of its gap, if it has one
+        double vain;             ///< leftAfterTries()
+    };
     struct BlockView {
         Eigen::Vector3f centre;
         float radius;
@@ -164,6 +171,7 @@ class ViewScorer {
     std::vector<BlockView> blocks_;
     std::vector<Group> groups_;
     std::vector<const RiftRecord*> open_;  ///< by block, then key
+    std::vector<OpenCell> openCells_;      ///< of open_
     std::vector<FreeSpace::Frontier> frontier_;
     Points frontierCentres_;
     double frontierEdge_ = 0;  ///< of its voxels [m]
