@@ -8,6 +8,7 @@
 #include <map>
 
 #include "riftmap/core/parallel.h"
+#include "square_kernel.h"
 
 namespace riftmap {
 
@@ -34,8 +35,26 @@ struct ViewScorer::DepthBuffer {
         return depth[static_cast<std::size_t>(row) * static_cast<std::size_t>(width) +
                      static_cast<std::size_t>(column)];
     }
-    void splat(const Points& points, const Pose& camera_T_world, float half, double farLimit);
+    SquareCamera squares(const Pose& camera_T_world, float half, double farLimit) const;
 };
+
+/// What squares are drawn with into this buffer; half their edge in metres.
+SquareCamera ViewScorer::DepthBuffer::squares(const Pose& camera_T_world, float half,
+                                              double farLimit) const {
+    SquareCamera c;
+    c.rotation = camera_T_world.rotation.cast<float>();
+    c.translation = camera_T_world.translation.cast<float>();
+    c.fx = fx;
+    c.fy = fy;
+    c.cx = cx;
+    c.cy = cy;
+    c.half = half;
+    c.nearest = kNearest;
+    c.farthest = static_cast<float>(farLimit);
+    c.width = width;
+    c.height = height;
+    return c;
+}
 
 struct ViewScorer::Drawing {
     Pose world_T_camera;
@@ -43,59 +62,43 @@ struct ViewScorer::Drawing {
     std::vector<const BlockView*> seen;  ///< those in sight, in the blocks' own order
 };
 
-/// Draws squares that face the camera around points of the map within its range; half the edge in
-/// metres.
-void ViewScorer::DepthBuffer::splat(const Points& points, const Pose& camera_T_world, float half,
-                                    double farLimit) {
-    constexpr Eigen::Index kAtOnce = 128;  // so many at a time, in vector code
-    using Floats = Eigen::Array<float, Eigen::Dynamic, 1, Eigen::ColMajor, kAtOnce, 1>;
-    using Pixels = Eigen::Array<int, Eigen::Dynamic, 1, Eigen::ColMajor, kAtOnce, 1>;
-    const Eigen::Matrix3f rotation = camera_T_world.rotation.cast<float>();
-    const Eigen::Vector3f translation = camera_T_world.translation.cast<float>();
-    const auto most = static_cast<float>(farLimit);
-    for (Eigen::Index begin = 0; begin < points.rows(); begin += kAtOnce) {
-        const Eigen::Index n = std::min(kAtOnce, points.rows() - begin);
-        const auto some = points.middleRows(begin, n).array();
-        // In the order in which Eigen multiplies a matrix with one vector, for the same bits.
-        const auto along = [&](int axis) -> Floats {
-            return rotation(axis, 0) * some.col(0) +
-                   (rotation(axis, 1) * some.col(1) + rotation(axis, 2) * some.col(2)) +
-                   translation[axis];
-        };
-        const Floats z = along(2);
-        const Floats away = z.max(kNearest);
-        const Floats u = fx * along(0) / away + cx;
-        const Floats v = fy * along(1) / away + cy;
-        const Floats r = fx * half / away;
-        // The nearest pixel, counted from 1, 0 for all that lie before the first: without a call of
-        // the library.
-        const auto nearest = [&](const Floats& x) {
-            const Floats rounded = x.max(-1.0F).min(1e6F) + 1.5F;
-            Pixels pixels(n);
-            for (Eigen::Index i = 0; i < n; ++i) {
-                pixels[i] = static_cast<int>(rounded[i]);
-            }
-            return pixels;
-        };
-        const Pixels left = nearest(u - r);
-        const Pixels right = nearest(u + r);
-        const Pixels top = nearest(v - r);
-        const Pixels bottom = nearest(v + r);
-        for (Eigen::Index i = 0; i < n; ++i) {
-            if (!(z[i] >= kNearest && z[i] <= most)) {
-                continue;
-            }
-            const int lastColumn = std::min(width, right[i]);
-            const int lastRow = std::min(height, bottom[i]);
-            for (int row = std::max(1, top[i]); row <= lastRow; ++row) {
-                for (int column = std::max(1, left[i]); column <= lastColumn; ++column) {
-                    float& d = at(column - 1, row - 1);
-                    d = std::min(d, z[i]);
-                }
+namespace {
+
+/// Collects places and draws squares around them, so many at a time.
+class SquareDrawer {
+ public:
+    SquareDrawer(const SquareCamera& camera, std::vector<float>& depth)
+        : camera_(camera), depth_(&depth) {}
+
+    void add(const Eigen::Matrix<float, Eigen::Dynamic, 3>& places) {
+        for (Eigen::Index begin = 0; begin < places.rows();) {
+            const auto room = static_cast<Eigen::Index>(SquareBatch::kMost - batch_.count);
+            const Eigen::Index n = std::min(room, places.rows() - begin);
+            const auto put = [&](int axis, std::array<float, SquareBatch::kMost>& to) {
+                std::copy_n(places.col(axis).data() + begin, n, to.data() + batch_.count);
+            };
+            put(0, batch_.x);
+            put(1, batch_.y);
+            put(2, batch_.z);
+            batch_.count += static_cast<std::size_t>(n);
+            begin += n;
+            if (batch_.count == SquareBatch::kMost) {
+                finish();
             }
         }
     }
-}
+    void finish() {
+        drawSquares(camera_, batch_, depth_->data());
+        batch_.count = 0;
+    }
+
+ private:
+    SquareCamera camera_;
+    SquareBatch batch_;
+    std::vector<float>* depth_;
+};
+
+}  // namespace
 
 ViewScorer::ViewScorer(const SensorModel& sensor, const SurfaceSummary& summary,
                        const RiftLedger& ledger, const FreeSpace& space, double resolution,
@@ -280,9 +283,11 @@ std::shared_ptr<const ViewScorer::Drawing> ViewScorer::draw(const Pose& world_T_
         }
     }
     std::sort(seen.begin(), seen.end());
+    SquareDrawer drawer(b.squares(camera_T_world, half, sensor_.farLimit), b.depth);
     for (const BlockView* block : seen) {
-        b.splat(block->block->positions, camera_T_world, half, sensor_.farLimit);
+        drawer.add(block->block->positions);
     }
+    drawer.finish();
     return drawing;
 }
 
@@ -466,7 +471,10 @@ ViewScorer::Seen ViewScorer::sightsAtMost(const Pose& world_T_camera) const {
     const Eigen::Matrix3f rotation = camera_T_world.rotation.cast<float>();
     const Eigen::Vector3f translation = camera_T_world.translation.cast<float>();
     const auto voxel = static_cast<float>(frontierEdge_);
-    buffer.splat(frontierCentres_, camera_T_world, 0.5F * voxel, sensor_.farLimit);
+    SquareDrawer drawer(buffer.squares(camera_T_world, 0.5F * voxel, sensor_.farLimit),
+                        buffer.depth);
+    drawer.add(frontierCentres_);
+    drawer.finish();
     const auto put = [&](std::size_t item, double share) {
         if (share > 0.02) {
             result.sights.push_back({static_cast<std::uint32_t>(item), static_cast<float>(share)});
