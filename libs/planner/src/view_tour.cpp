@@ -136,13 +136,13 @@ class Picker {
         std::vector<double> costs(views_->size());
         // What a view adds only shrinks as others are picked: the last value is an upper bound.
         std::vector<double> utilities(views_->size(), 0.0);
-        for (std::size_t v = 0; v < views_->size(); ++v) {
+        parallelForEach(views_->size(), 16, [&](std::size_t v) {
             if (gains_[v] > options_.minGain) {
                 places[v] = cheapestInsertion(*views_, *between_, stops, v);
                 costs[v] = options_.viewCost + std::max(0.0, places[v].detour);
                 utilities[v] = gains_[v] / costs[v];
             }
-        }
+        });
         const std::size_t best = greatestOf(utilities, [&](std::span<const std::size_t> some) {
             leaveOutWhatIsTooMany(some);
             parallelForEach(some.size(), 1, [&](std::size_t i) {

@@ -45,7 +45,7 @@ struct TourOptions {
     std::size_t maxViews = 10;  ///< stops at most; the order is exact: 2^n n^2 steps, n <= 16
     /// Candidates that `settle` is asked about, see planTour(); of the others nothing uncertain
     /// counts.
-    std::size_t maxSettled = 150;
+    std::size_t maxSettled = 190;
     /// Cost of a metre (or a view) once nothing is left to see, >= 0; while there is, the share
     /// R(k) of tourCost() is added. 0 = early gain alone counts, large = the length alone.
     double tail = 0.2;
@@ -77,7 +77,7 @@ class SeenItems {
     std::vector<float> seen_;
 };
 
-/// Length of the way between two candidates [m].
+/// Length of the way between two candidates [m]. Called from several threads at a time.
 using WayLength = std::function<double(std::size_t, std::size_t)>;
 
 /// Settles the uncertain sights of the candidate with this index, as settleSights() does. It is
