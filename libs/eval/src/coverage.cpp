@@ -202,7 +202,7 @@ CoverageReport CoverageJudge::evaluate(std::span<const Eigen::Vector3f> vertices
     const double step = 2 * std::sqrt(meshArea_ / static_cast<double>(report.samples));
     const std::vector<float> distances = sampleDistances(vertices);
     const double reach = std::max(kReach, step);
-    // A rim is a vertex of the map, and what is uncovered has none within the headline distance.
+    // What is uncovered has no vertex within the headline distance, so no rim either.
     if (rifts != nullptr && reach > headline_) {
         report.explained = explainedShare(distances, headline_, *rifts, reach);
     }

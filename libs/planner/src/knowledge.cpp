@@ -121,7 +121,7 @@ void PlannerOptions::describe(OptionTable& table) {
     table.add("view_cost", viewCost, 0.01, 100, "m", "Cost of taking a view, as length of path");
     table.add("min_gain", minGain, 0, 1, "",
               "A view that promises less than this share of the surface known is not worth taking; "
-              "0 = 0.0005, with exact depth 0.0001, with noisy depth that is not matched 0.0007; "
+              "0 = 0.0004, with exact depth 0.0001, with noisy depth that is not matched 0.0007; "
               "around an object (surface_box) 0.0003, 0.0004 and 0.0005");
     table.add("max_attempts", maxAttempts, 1, 100, "",
               "Different views of a tear that may fail before it is given up");
@@ -301,7 +301,7 @@ double Knowledge::minGain() const {
     struct Shares {
         double inRooms, aroundObject;
     };
-    constexpr Shares kExact{1e-4, 4e-4}, kPixelwise{7e-4, 5e-4}, kMatched{5e-4, 3e-4};
+    constexpr Shares kExact{1e-4, 4e-4}, kPixelwise{7e-4, 5e-4}, kMatched{4e-4, 3e-4};
     const Shares& shares = sensor_.exactDepth() ? kExact
                            : sensor_.matched()  ? kMatched
                                                 : kPixelwise;

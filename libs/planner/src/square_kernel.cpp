@@ -34,12 +34,12 @@ void drawOf(const SquareCamera& c, const SquareBatch& batch, float* depth) {
     alignas(64) std::array<std::int32_t, kMost> left, right, top, bottom;
     std::array<std::uint64_t, kMost / 64> inImage{};
     const std::size_t step = hn::Lanes(d);
-    constexpr hn::CappedTag<float, 1> one;
     for (std::size_t i = 0; i < batch.count; i += step) {
         const V x = hn::Load(d, &batch.x[i]);
         const V y = hn::Load(d, &batch.y[i]);
         const V w = hn::Load(d, &batch.z[i]);
-        // In the order in which Eigen multiplies a matrix with a vector, for the same bits.
+        // In the order in which Eigen multiplies a matrix with a vector, and without fused
+        // operations (-ffp-contract=off), for the same bits.
         const auto along = [&](int axis) {
             const auto times = [&](int k, V v) {
                 return hn::Mul(hn::Set(d, c.rotation(axis, k)), v);
@@ -68,7 +68,7 @@ void drawOf(const SquareCamera& c, const SquareBatch& batch, float* depth) {
         hn::Store(ri, di, &right[i]);
         hn::Store(t, di, &top[i]);
         hn::Store(b, di, &bottom[i]);
-        std::array<std::uint8_t, 8> bits{};
+        std::array<std::uint8_t, 8> bits{};  // as slotBits() of the graph does
         hn::StoreMaskBits(d, drawn, bits.data());
         inImage[i / 64] |= std::uint64_t{unsigned{bits[0]} | (unsigned{bits[1]} << 8U)} << (i % 64);
     }
@@ -76,11 +76,11 @@ void drawOf(const SquareCamera& c, const SquareBatch& batch, float* depth) {
         for (std::uint64_t rest = inImage[begin / 64]; rest != 0; rest &= rest - 1) {
             const std::size_t i = begin + static_cast<std::size_t>(std::countr_zero(rest));
             for (int row = top[i]; row <= bottom[i]; ++row) {
-                float* line = depth + static_cast<std::ptrdiff_t>(row - 1) * c.width - 1;
+                float* line = depth + static_cast<std::ptrdiff_t>(row - 1) * c.width;
                 for (int column = left[i]; column <= right[i]; ++column) {
-                    // Without a branch, which nobody could foretell.
-                    hn::Store(hn::Min(hn::Load(one, line + column), hn::Set(one, z[i])), one,
-                              line + column);
+                    // In this form without a branch, which nobody could foretell.
+                    const float old = line[column - 1];
+                    line[column - 1] = z[i] < old ? z[i] : old;
                 }
             }
         }

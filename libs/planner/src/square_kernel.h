@@ -6,8 +6,6 @@
 #include <array>
 #include <cstddef>
 
-#include "riftmap/core/pose.h"
-
 namespace riftmap {
 
 /// What squares are drawn with.
@@ -15,20 +13,21 @@ struct SquareCamera {
     Eigen::Matrix3f rotation;  ///< of camera_T_world
     Eigen::Vector3f translation;
     float fx = 0, fy = 0, cx = 0, cy = 0;  ///< [px of the depth image]
-    float half = 0;                        ///< half of a square's edge [m]
-    float nearest = 0, farthest = 0;       ///< depths that are drawn [m], nearest > 0
-    int width = 0, height = 0;             ///< of the depth image [px]
+    float half = 0;                   ///< half of a square's edge [m], by fx in both directions
+    float nearest = 0, farthest = 0;  ///< depths that are drawn [m], nearest > 0
+    int width = 0, height = 0;        ///< of the depth image [px], below 10^6
 };
 
 /// Places that squares are drawn around, as many as are drawn at once. Map frame [m].
 struct SquareBatch {
     static constexpr std::size_t kMost = 128;
-    alignas(64) std::array<float, kMost> x, y, z;
-    std::size_t count = 0;
+    alignas(64) std::array<float, kMost> x{}, y{}, z{};  ///< those behind `count` may be anything
+    std::size_t count = 0;                               ///< kMost at most
 };
 
-/// Draws squares that face the camera into the depth image (row by row): each pixel whose centre is
-/// nearest to some of the square takes its depth, if that is less than the pixel's.
+/// Draws squares that face the camera into the depth image (width * height values, row by row [m]):
+/// each pixel whose centre is the nearest to some point of the square takes its depth, if that is
+/// less than the pixel's. O(count + pixels drawn). Thread-safe for different images.
 void drawSquares(const SquareCamera& camera, const SquareBatch& batch, float* depth);
 
 }  // namespace riftmap

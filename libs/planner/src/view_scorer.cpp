@@ -64,7 +64,8 @@ struct ViewScorer::Drawing {
 
 namespace {
 
-/// Collects places and draws squares around them, so many at a time.
+/// Collects places and draws squares around them, so many at a time; all are drawn once finish()
+/// was called.
 class SquareDrawer {
  public:
     SquareDrawer(const SquareCamera& camera, std::vector<float>& depth)

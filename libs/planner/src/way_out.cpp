@@ -38,12 +38,12 @@ std::vector<Eigen::Vector3d> Choice::inTheWayOut() const {
 /// Where the camera cannot leave its place: of the views that free most of what may stand in its
 /// way, by sight and by being there, the one that shows most else.
 std::optional<ViewPlan> Choice::wayOut() {
-    constexpr std::size_t kFew = 64;                // [voxels] that can be reached
-    if (k_.surfaceBox() || k_.reached() >= kFew) {  // around an object all is free
+    if (k_.surfaceBox() || !k_.confined()) {  // around an object all is free
         return std::nullopt;
     }
     std::vector<Eigen::Vector3d> eyes = k_.space().reachable(1);
-    if (eyes.size() >= kFew) {  // by passages
+    constexpr std::size_t kFew = 64;  // [voxels]
+    if (eyes.size() >= kFew) {        // by passages
         return std::nullopt;
     }
     if (eyes.empty()) {

@@ -6,6 +6,7 @@
 #include <hwy/targets.h>
 
 #include <algorithm>
+#include <array>
 #include <limits>
 #include <random>
 #include <string>
@@ -55,6 +56,7 @@ TEST(SquareKernel, DrawsAsPlainLoopsDoOnEveryInstructionSet) {
         const Pose camera_T_world =
             lookAt({0.1, -0.2, 0.3}, {uniform(-1, 1), uniform(-1, 1), uniform(-0.9F, 0.9F)})
                 .inverse();
+        const bool onGrid = seed % 4 == 0;  // depths at the limits, rims on the middle of pixels
         SquareCamera camera;
         camera.rotation = camera_T_world.rotation.cast<float>();
         camera.translation = camera_T_world.translation.cast<float>();
@@ -67,14 +69,35 @@ TEST(SquareKernel, DrawsAsPlainLoopsDoOnEveryInstructionSet) {
         camera.half = uniform(0.001F, 0.3F);
         camera.nearest = 0.05F;
         camera.farthest = uniform(1, 4);
+        if (onGrid) {
+            camera.rotation.setIdentity();
+            camera.translation.setZero();
+            camera.width = 120 + static_cast<int>(random() % 20);
+            camera.fx = camera.fy = 16;
+            camera.cx = 60;
+            camera.cy = 10;
+            camera.half = 0.0625F;
+            camera.nearest = 0.5F;
+            camera.farthest = 2;
+        }
         SquareBatch batch;
         batch.count = seed == 1 ? 0 : 1 + random() % SquareBatch::kMost;
         for (std::size_t i = 0; i < SquareBatch::kMost; ++i) {  // what lies behind is not drawn
             batch.x[i] = uniform(-3, 3);
             batch.y[i] = uniform(-3, 3);
             batch.z[i] = uniform(-3, 3);
+            if (onGrid) {
+                constexpr std::array<float, 6> depths = {0.25F, 0.499F, 0.5F, 1, 2, 2.001F};
+                batch.z[i] = depths[random() % depths.size()];
+                batch.x[i] =
+                    batch.z[i] * static_cast<float>(static_cast<int>(random() % 160) - 80) / 32;
+                batch.y[i] =
+                    batch.z[i] * static_cast<float>(static_cast<int>(random() % 60) - 30) / 32;
+            }
             if (random() % 20 == 0) {
                 batch.y[i] = std::numeric_limits<float>::quiet_NaN();
+            } else if (random() % 20 == 0) {
+                batch.x[i] = random() % 2 == 0 ? 1e9F : -1e9F;
             }
         }
         std::vector<float> blank(static_cast<std::size_t>(camera.width * camera.height),

@@ -115,9 +115,34 @@ TEST_F(Slit, isNotLookedForWhileItCouldLeadNowhere) {
     EXPECT_TRUE(knowledge.openPassages(false));  // the first look
 }
 
+/// A camera that sinks, looking ahead, does not know what is below it, and being there does not
+/// tell. (It freed its way into the floor once, step by step.)
+TEST_F(Slit, noWayIsFreedByGoingThere) {
+    see(0);
+    ASSERT_FALSE(knowledge.confined());
+    double lowest = 0;
+    for (const Eigen::Vector3d& place : knowledge.space().reachable(1)) {
+        lowest = std::min(lowest, place.z());
+    }
+    for (int i = 0; i < 20; ++i) {
+        const auto place =
+            knowledge.placeAt(knowledge.camera().translation - Eigen::Vector3d(0, 0, 0.1));
+        if (!place || place->path == 0) {
+            break;
+        }
+        const View view =
+            test::viewOf(lookAt(place->eye, place->eye + Eigen::Vector3d::UnitX()), test::wall(4));
+        graph.merge(view);
+        knowledge.update(view);
+        knowledge.updateReach();
+    }
+    EXPECT_LT(knowledge.camera().translation.z(), 0.0);  // some way is known
+    EXPECT_GE(knowledge.camera().translation.z(), lowest - 2 * knowledge.space().voxelSize());
+}
+
 TEST_F(Slit, theLeastGainFollowsTheDepthUnlessItIsGiven) {
     see(0.5);
-    EXPECT_NEAR(knowledge.minGain(), 5e-4 * knowledge.summary().area(), 1e-12);
+    EXPECT_NEAR(knowledge.minGain(), 4e-4 * knowledge.summary().area(), 1e-12);
     PlatformLimits exact = limits();
     exact.depthKind = DepthKind::kExact;
     PlatformLimits pixelwise = limits();

@@ -42,8 +42,9 @@ struct CoverageReport {
     double errorP95 = std::numeric_limits<double>::quiet_NaN();
     double errorMean = std::numeric_limits<double>::quiet_NaN();
     /// Share of the uncovered observable samples that the listed rifts explain; 1 where nothing is
-    /// uncovered. NaN without a list, and where the headline distance is not below the reach of
-    /// 5 cm (or two spacings of the samples): no rim of the map can lie so near.
+    /// uncovered. NaN without a list, and in any case where the headline distance is not below the
+    /// reach of 5 cm (or two spacings of the samples): no vertex of the map can lie so near what is
+    /// uncovered, and of lists of other places nothing is told either, so that figures compare.
     double explained = std::numeric_limits<double>::quiet_NaN();
     /// Share of the verdicts "no camera can close this tear" that are true (trueVerdicts());
     /// NaN without such verdicts.

@@ -88,7 +88,8 @@ class RiftLedger {
     const std::map<std::uint64_t, RiftRecord>& records() const { return records_; }
     /// The records whose cell, state or reason was written since the last call, ascending in key.
     std::vector<const RiftRecord*> takeChanged();
-    /// Those of the cells in one block of the summary, ascending in key.
+    /// Those of the cells in one block of the summary, ascending in key; valid until the next
+    /// update(). O(1).
     std::span<const RiftRecord* const> inBlock(std::uint64_t block) const;
     /// Of records, by state.
     const std::array<std::size_t, kRiftStates>& counts() const { return counts_; }

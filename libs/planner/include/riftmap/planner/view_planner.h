@@ -81,9 +81,18 @@ class Knowledge {
     const PlatformLimits& limits() const { return limits_; }
     const PlannerOptions& options() const { return options_; }
     double clearance() const { return limits_.clearance + options_.clearanceMargin; }
-    /// What is taken to be free around a camera that takes a view [m]: two voxels more than its
-    /// clearance let it take the first step without having looked straight up and down.
-    double freeAround() const { return limits_.clearance + 2.2 * space_.voxelSize(); }
+    /// True as long as hardly a voxel can be reached: at first, where the camera has to find a way
+    /// out of its place.
+    bool confined() const { return reached_ < 64; }
+    /// Voxels whose centre is nearer to a camera that takes a view than this are free, for it is
+    /// there [m]: those that lie within its clearance as a whole. While it is confined two voxels
+    /// more than its clearance are taken to be free, or it could not take the first step without
+    /// having looked straight up and down. (Not later: it would free its way into what no view
+    /// saw, step by step.)
+    double freeAround() const {
+        const double voxel = space_.voxelSize();
+        return limits_.clearance + (confined() ? 2.2 : -std::sqrt(0.75)) * voxel;
+    }
     const SensorModel& sensor() const { return sensor_; }
     const SurfaceSummary& summary() const { return summary_; }
     const FreeSpace& space() const { return space_; }

@@ -59,7 +59,8 @@ class ViewScorer {
         bool byExperience = false;
     };
 
-    /// Everything must outlive the scorer and stay as it is.
+    /// Everything must outlive the scorer and stay as it is, but for the states and reasons of
+    /// records (RiftLedger::giveUp(), reopen()).
     ViewScorer(const SensorModel& sensor, const SurfaceSummary& summary, const RiftLedger& ledger,
                const FreeSpace& space, double resolution, const Weights& weights);
 
@@ -89,6 +90,7 @@ class ViewScorer {
     /// (byExperience) by what came of views of others like it.
     double leftAfterTries(const RiftRecord& record) const;
 
+    /// The cells that were open when it was made, by block, then key.
     const std::vector<const RiftRecord*>& open() const { return open_; }
 
     /// For the choice of several views at once: what there is to see as a list of items. For every
@@ -134,7 +136,7 @@ class ViewScorer {
     struct OpenCell {
         Eigen::Vector3f open;    ///< its openPosition
         Eigen::Vector3f wanted;  ///< what is to be seen: the place of its gap, if it has one
-        double vain;             ///< leftAfterTries()
+        double vain;             ///< leftAfterTries(), which tries alone change
     };
     struct BlockView {
         Eigen::Vector3f centre;
