@@ -122,7 +122,7 @@ void PlannerOptions::describe(OptionTable& table) {
     table.add("min_gain", minGain, 0, 1, "",
               "A view that promises less than this share of the surface known is not worth taking; "
               "0 = 0.0004, with exact depth 0.0001, with noisy depth that is not matched 0.0007; "
-              "around an object (surface_box) 0.0003, 0.0004 and 0.0005");
+              "around an object (surface_box) 0.0003, 0.0004 and 0.00048");
     table.add("max_attempts", maxAttempts, 1, 100, "",
               "Different views of a tear that may fail before it is given up");
     table.add("unknown_weight", unknownWeight, 0, 100, "",
@@ -301,7 +301,7 @@ double Knowledge::minGain() const {
     struct Shares {
         double inRooms, aroundObject;
     };
-    constexpr Shares kExact{1e-4, 4e-4}, kPixelwise{7e-4, 5e-4}, kMatched{4e-4, 3e-4};
+    constexpr Shares kExact{1e-4, 4e-4}, kPixelwise{7e-4, 4.8e-4}, kMatched{4e-4, 3e-4};
     const Shares& shares = sensor_.exactDepth() ? kExact
                            : sensor_.matched()  ? kMatched
                                                 : kPixelwise;

@@ -61,7 +61,7 @@ std::vector<World> worlds() {
         {"small_house",
          "explore-indoor.ini",
          {"World.mesh=" + data + "/world_aws_small_house/aws_small_house.obj",
-          "Graph.target_resolution=0.015", "Stop.max_views=800"},
+          "Graph.target_resolution=0.015", "Planner.min_gain=0.00007", "Stop.max_views=800"},
          {"N0"},
          false,
          6},
