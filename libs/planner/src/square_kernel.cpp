@@ -30,8 +30,8 @@ HWY_INLINE VI nearestPixel(V x) {
 
 void drawOf(const SquareCamera& c, const SquareBatch& batch, float* depth) {
     constexpr std::size_t kMost = SquareBatch::kMost;
-    alignas(64) std::array<float, kMost> z;
-    alignas(64) std::array<std::int32_t, kMost> left, right, top, bottom;
+    alignas(64) std::array<float, kMost> z{};
+    alignas(64) std::array<std::int32_t, kMost> left{}, right{}, top{}, bottom{};
     std::array<std::uint64_t, kMost / 64> inImage{};
     const std::size_t step = hn::Lanes(d);
     for (std::size_t i = 0; i < batch.count; i += step) {

@@ -267,7 +267,8 @@ class SlowTracker {
             std::set<Index> group{seed};
             for (bool grown = true; grown;) {
                 grown = false;
-                for (const auto& [cell, other] : tears) {
+                for (const auto& [index, other] : tears) {
+                    const Index& cell = index;
                     const bool touches =
                         std::any_of(group.begin(), group.end(), [&](const Index& i) {
                             return std::abs(i[0] - cell[0]) <= 1 && std::abs(i[1] - cell[1]) <= 1 &&

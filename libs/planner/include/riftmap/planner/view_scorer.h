@@ -136,7 +136,7 @@ class ViewScorer {
     struct OpenCell {
         Eigen::Vector3f open;    ///< its openPosition
         Eigen::Vector3f wanted;  ///< what is to be seen: the place of its gap, if it has one
-        double vain;             ///< leftAfterTries(), which tries alone change
+        double vain = 0;         ///< leftAfterTries(), which tries alone change
     };
     struct BlockView {
         Eigen::Vector3f centre;
