@@ -42,8 +42,7 @@ std::optional<ViewPlan> Choice::wayOut() {
         return std::nullopt;
     }
     std::vector<Eigen::Vector3d> eyes = k_.space().reachable(1);
-    constexpr std::size_t kFew = 64;  // [voxels]
-    if (eyes.size() >= kFew) {        // by passages
+    if (eyes.size() >= Knowledge::kFew) {  // by passages
         return std::nullopt;
     }
     if (eyes.empty()) {

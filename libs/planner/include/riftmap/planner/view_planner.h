@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <cmath>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -83,7 +84,8 @@ class Knowledge {
     double clearance() const { return limits_.clearance + options_.clearanceMargin; }
     /// True as long as hardly a voxel can be reached: at first, where the camera has to find a way
     /// out of its place.
-    bool confined() const { return reached_ < 64; }
+    bool confined() const { return reached_ < kFew; }
+    static constexpr std::size_t kFew = 64;  ///< [voxels]
     /// Voxels whose centre is nearer to a camera that takes a view than this are free, for it is
     /// there [m]: those that lie within its clearance as a whole. While it is confined two voxels
     /// more than its clearance are taken to be free, or it could not take the first step without
