@@ -19,7 +19,8 @@ void ExploreOptions::describe(OptionTable& table) {
                      {"orbit", Planner::kOrbit},
                      {"lawnmower", Planner::kLawnmower},
                      {"sphere", Planner::kSphere},
-                     {"octomap_frontier", Planner::kOctomapFrontier}},
+                     {"octomap_frontier", Planner::kOctomapFrontier},
+                     {"foresight", Planner::kForesight}},
                     "Who chooses the views");
     table.add("known_box", knownBox,
               "Tell the planner the box that holds all surfaces: an object that stands alone, with "

@@ -100,10 +100,10 @@ ExploreRun::ExploreRun(ExploreProgram& program, RunDirectory& directory, bool re
             }
         }
     }
-    planner_ = makePlanner();
     if (program.explore_.judge) {
         makeJudge();
     }
+    planner_ = makePlanner();
     if (resumed) {
         record_ = salvageRecord(directory, program.explore_.rawlog,
                                 judge_ ? judge_->deltas() : std::vector<double>());
@@ -160,10 +160,11 @@ void ExploreRun::record(StereoObservation& observation) {
 
 std::unique_ptr<ViewPlanner> ExploreRun::makePlanner() {
     using Kind = ExploreOptions::Planner;
+    const auto planner = [&](const std::string& name, std::unique_ptr<ViewSource> source) {
+        return std::make_unique<BaselinePlanner>(name, std::move(source), *platform_, cloud_);
+    };
     const auto baseline = [&](const std::string& name) {
-        return std::make_unique<BaselinePlanner>(
-            name, makeBaseline(name, program_.baseline_, target_, program_.seed()), *platform_,
-            cloud_);
+        return planner(name, makeBaseline(name, program_.baseline_, target_, program_.seed()));
     };
     switch (program_.explore_.planner) {
         case Kind::kPaper:
@@ -178,6 +179,14 @@ std::unique_ptr<ViewPlanner> ExploreRun::makePlanner() {
             return baseline("sphere");
         case Kind::kOctomapFrontier:
             return baseline("octomap_frontier");
+        case Kind::kForesight:
+            if (!judge_) {
+                throw ConfigError(
+                    "[Explore] planner = foresight knows the surface from the judge: it needs "
+                    "judge = true");
+            }
+            return planner("foresight", makeForesight(*judge_, platform_->rayCaster(),
+                                                      program_.baseline_, program_.seed()));
         case Kind::kRiftmap:
             break;
     }

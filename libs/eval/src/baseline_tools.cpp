@@ -50,6 +50,16 @@ std::optional<std::vector<Pose>> pathTo(const BaselineState& state, const Pose& 
     return path;
 }
 
+bool inView(const BaselineState& state, const Pose& view, const Eigen::Vector3d& place) {
+    const Eigen::Vector3d p = view.inverse() * place;
+    if (p.z() < state.limits.nearLimit || p.z() > state.limits.farLimit) {
+        return false;
+    }
+    const Eigen::Vector2d pixel = state.camera.project(p);
+    return pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < state.camera.width &&
+           pixel.y() < state.camera.height;
+}
+
 double pathLength(const Pose& from, const std::vector<Pose>& path) {
     double sum = 0;
     Eigen::Vector3d here = from.translation;

@@ -20,6 +20,9 @@ Pose viewOf(const PlatformLimits& limits, const Eigen::Vector3d& place,
 std::optional<std::vector<Pose>> pathTo(const BaselineState& state, const Pose& view,
                                         std::size_t maxNodes);
 
+/// Whether a place is within the image and the range of a view.
+bool inView(const BaselineState& state, const Pose& view, const Eigen::Vector3d& place);
+
 double pathLength(const Pose& from, const std::vector<Pose>& path);  ///< [m]
 
 double uniform(std::mt19937_64& random);  ///< in [0, 1)

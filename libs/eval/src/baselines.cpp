@@ -251,6 +251,7 @@ void BaselineOptions::describe(OptionTable& table) {
     table.add("min_gain", minGain, 0.0, 1.0, "",
               "octomap_frontier ends when its best view would show less than this share of the "
               "frontier voxels that would fill an image.");
+    table.add("poses", poses, 1, 1000000, "", "Random poses that foresight picks its views from.");
 }
 
 const std::vector<std::string>& baselineNames() {

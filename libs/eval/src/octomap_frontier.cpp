@@ -207,16 +207,6 @@ class OctomapFrontier : public ViewSource {
         tree_.insertPointCloud(cloud, octomap::point3d(o.x(), o.y(), o.z()), -1.0, false, true);
     }
 
-    static bool inView(const BaselineState& state, const Pose& view, const Eigen::Vector3d& p) {
-        const Eigen::Vector3d q = view.inverse() * p;
-        if (q.z() < state.limits.nearLimit || q.z() > state.limits.farLimit) {
-            return false;
-        }
-        const Eigen::Vector2d pixel = state.camera.project(q);
-        return pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < state.camera.width &&
-               pixel.y() < state.camera.height;
-    }
-
     /// A random place, and of the directions towards frontiers seen from there the best one.
     std::optional<Candidate> candidate(const BaselineState& state, const VoxelGrid& grid,
                                        const std::vector<Frontier>& frontiers) {

@@ -210,7 +210,7 @@ std::optional<ViewPlan> Choice::makeAround(const Eigen::AlignedBox3d& box) {
     }
     candidates_ = {Candidate(candidates_[tour.views.front()])};
     for (int round = 0; round < 2; ++round) {
-        refine(Candidate(candidates_.front()));
+        vary(Candidate(candidates_.front()), 24, 1.0);
         keepBestAround();
     }
     return planFor(candidates_.front());

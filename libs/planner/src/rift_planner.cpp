@@ -166,34 +166,57 @@ void Choice::addPool() {
     }
 }
 
-void Choice::keepPool() {
-    std::vector<std::size_t> order(candidates_.size());
-    for (std::size_t i = 0; i < order.size(); ++i) {
-        order[i] = i;
+/// Whether two views are from about the same place in about the same direction.
+bool Choice::alike(const Pose& a, const Pose& b) const {
+    constexpr double kVoxels = 6;
+    constexpr double kTurned = 0.8;  // cosine between their axes
+    return (a.translation - b.translation).norm() < kVoxels * k_.space().voxelSize() &&
+           a.rotation.col(2).dot(b.rotation.col(2)) > kTurned;
+}
+
+/// Indices of the candidates of greatest value above 0, best first; of those that are alike the
+/// first.
+std::vector<std::size_t> Choice::bestApart(std::size_t most, Value valueOf) const {
+    std::vector<std::size_t> order;
+    for (std::size_t i = 0; i < candidates_.size(); ++i) {
+        if (valueOf(candidates_[i]) > 0) {
+            order.push_back(i);
+        }
     }
     std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-        return candidates_[a].score.gain > candidates_[b].score.gain;
+        return valueOf(candidates_[a]) > valueOf(candidates_[b]);
     });
-    pool_.clear();
-    for (const std::size_t i : order) {
-        constexpr std::size_t kPool = 64;
-        const Candidate& c = candidates_[i];
-        if (pool_.size() < kPool && c.path > 0 && c.score.gain > 0) {
-            pool_.push_back(c.pose);
+    std::vector<std::size_t> apart;
+    for (std::size_t i = 0; i < order.size() && apart.size() < most; ++i) {
+        const Pose& pose = candidates_[order[i]].pose;
+        if (std::none_of(apart.begin(), apart.end(),
+                         [&](std::size_t other) { return alike(pose, candidates_[other].pose); })) {
+            apart.push_back(order[i]);
         }
+    }
+    return apart;
+}
+
+void Choice::keepPool() {
+    constexpr std::size_t kPool = 64;
+    pool_.clear();
+    for (const std::size_t i :
+         bestApart(kPool, [](const Candidate& c) { return c.path > 0 ? c.score.gain : 0.0; })) {
+        pool_.push_back(candidates_[i].pose);
     }
 }
 
-/// Small changes of the best view.
-void Choice::refine(const Candidate& best) {
-    const Pose pose = best.pose;
-    const double reach = 2.0 * k_.space().voxelSize();
+/// So many changes of a view. At a scale of 1 it is moved by up to two voxels an axis (one in three
+/// is not, nor is a view from where the camera is) and turned by some 10 degrees.
+void Choice::vary(const Candidate& view, int count, double scale) {
+    const Pose pose = view.pose;
+    const double reach = scale * 2.0 * k_.space().voxelSize();
     const Eigen::Vector3d axis = pose.rotation.col(2);
-    for (int i = 0; i < 24; ++i) {
+    for (int i = 0; i < count; ++i) {
         const Eigen::Vector3d shift(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1));
         const Eigen::Vector3d turn =
-            0.25 * Eigen::Vector3d(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1));
-        const bool stay = best.path == 0.0 || i % 3 == 0;
+            scale * 0.25 * Eigen::Vector3d(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1));
+        const bool stay = view.path == 0.0 || i % 3 == 0;
         const Eigen::Vector3d eye =
             stay ? pose.translation : Eigen::Vector3d(pose.translation + reach * shift);
         const auto place = k_.placeAt(eye);
@@ -241,6 +264,25 @@ void Choice::preselect() {
     std::stable_sort(candidates_.begin(), candidates_.end(),
                      [](const Candidate& a, const Candidate& b) { return a.utility > b.utility; });
     candidates_.resize(kLeft);
+}
+
+/// From the best views that differ on to better ones: wide changes first, then ever smaller ones.
+/// The candidates are few for all the poses that there are (tests: Climb).
+void Choice::climb() {
+    constexpr int kRounds = 8;
+    constexpr double kWidest = 4;  // scale of the changes
+    constexpr double kFinest = 0.5;
+    constexpr std::size_t kViews = 2;
+    constexpr int kChanges = 12;
+    for (int round = 0; round < kRounds; ++round) {
+        const double scale = kWidest * std::pow(kFinest / kWidest, round / (kRounds - 1.0));
+        const std::size_t first = candidates_.size();
+        for (const std::size_t i :
+             bestApart(kViews, [](const Candidate& c) { return c.utility; })) {
+            vary(Candidate(candidates_[i]), kChanges, scale);
+        }
+        scoreFrom(first);
+    }
 }
 
 const Candidate* Choice::best() const {
@@ -506,13 +548,7 @@ std::optional<ViewPlan> Choice::make() {
     addPool();
     preselect();
     scoreFrom(0);
-    for (int round = 0; round < 2; ++round) {
-        if (const Candidate* b = best()) {
-            const std::size_t first = candidates_.size();
-            refine(Candidate(*b));
-            scoreFrom(first);
-        }
-    }
+    climb();
     keepPool();
     std::erase_if(candidates_, [&](const Candidate& c) {
         return c.score.gain < k_.minGain() || c.score.nearShare > 0.3;

@@ -48,13 +48,17 @@ class Choice {
     void addPlaces();
     void addPool();
     void keepPool();
-    void refine(const Candidate& best);
+    bool alike(const Pose& a, const Pose& b) const;
+    using Value = double (*)(const Candidate& candidate);
+    std::vector<std::size_t> bestApart(std::size_t most, Value valueOf) const;
+    void vary(const Candidate& view, int count, double scale);
     ViewScore scoreAround(const Pose& pose) const;
     ViewScore scoreOf(const ViewScorer::Seen& seen) const;
     void keepBestAround();
     void rate(Candidate& candidate, const ViewScore& score) const;
     void scoreFrom(std::size_t first);
     void preselect();
+    void climb();
     const Candidate* best() const;
     std::vector<Eigen::Vector3d> frontierSeen(const Pose& pose) const;
     std::optional<ViewPlan> planFor(const Candidate& candidate) const;

@@ -131,6 +131,9 @@ std::vector<Run> runs(const std::string& keep) {
             add(w, "N0", "paper", start);
             add(w, "N0", w.object ? "sphere" : "octomap_frontier", start);
             add(w, "N0", "random", start);
+            if (!w.object) {
+                add(w, "N0", "foresight", start);
+            }
         }
     }
     return table;

@@ -5,29 +5,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "choice_twin.h"
 #include "planner_scene.h"
 #include "random_scene.h"
-#include "view_choice.h"
 
 namespace riftmap {
-
-/// What the tests may call of a plan.
-struct ChoiceTwin {
-    static std::optional<Eigen::Vector3d> lookOut(const Choice& choice, const RiftRecord& record,
-                                                  const Eigen::Vector3d& out) {
-        return choice.lookOut(record, out, false);
-    }
-    static bool mayBeSeen(const Choice& choice, const RiftRecord& record) {
-        return choice.mayBeSeen(record);
-    }
-    static std::vector<Candidate> allInSight(Choice& choice, const RiftRecord& record,
-                                             std::size_t most) {
-        choice.candidates_.clear();
-        choice.addAllInSight(record, most);
-        return choice.candidates_;
-    }
-    static std::optional<ViewPlan> lastResorts(Choice& choice) { return choice.lastResorts(); }
-};
 
 namespace {
 

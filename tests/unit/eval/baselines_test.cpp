@@ -2,7 +2,9 @@
 #include "riftmap/eval/baselines.h"
 
 #include <gtest/gtest.h>
+#include <tbb/global_control.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "riftmap/eval/coverage.h"
@@ -50,14 +52,25 @@ class Loop {
         }
     }
 
-    double coverage(double delta) const {
+    CoverageJudge judge(double delta) const {
         EvalOptions options;
         options.samples = 5000;
         options.deltas = {delta};
-        const CoverageJudge judge(mesh_, caster_,
-                                  viewSpaceOf(limits_, camera_, views_[0].translation), options);
-        return judge.coverage(map_)[0].cObs;
+        options.headline = delta;
+        const Eigen::Vector3d start = views_.empty() ? pose_.translation : views_[0].translation;
+        return {mesh_, caster_, viewSpaceOf(limits_, camera_, start), options};
     }
+    double coverage(double delta) const { return judge(delta).coverage(map_)[0].cObs; }
+    /// After every view.
+    std::vector<double> curve(double delta) const {
+        const CoverageJudge judge = this->judge(delta);
+        std::vector<double> curve;
+        for (const std::size_t end : mapSizes_) {
+            curve.push_back(judge.coverage(std::span(map_).first(end))[0].cObs);
+        }
+        return curve;
+    }
+    const RayCaster& caster() const { return caster_; }
     const std::vector<Pose>& views() const { return views_; }
     bool ended() const { return ended_; }
     double metres() const { return metres_; }
@@ -86,6 +99,7 @@ class Loop {
         }
         map_.insert(map_.end(), cloud_.begin(), cloud_.end());
         views_.push_back(pose_);
+        mapSizes_.push_back(map_.size());
     }
 
     TriangleMesh mesh_;
@@ -95,6 +109,7 @@ class Loop {
     Pose pose_;
     std::vector<Eigen::Vector3f> cloud_, map_;
     std::vector<Pose> views_;
+    std::vector<std::size_t> mapSizes_;  ///< after each view
     double metres_ = 0;
     bool ended_ = false;
 };
@@ -121,6 +136,51 @@ TEST(Baselines, FrontierCoversTheRoomAndEnds) {
     loop.run(*makeBaseline("octomap_frontier", {}, kNoTarget, 1), 60);
     EXPECT_TRUE(loop.ended());
     EXPECT_GT(loop.coverage(0.1), 0.97) << loop.views().size() << " views";
+}
+
+/// Number of views until so much is covered; 1000 if it never is.
+std::size_t viewsTo(const std::vector<double>& curve, double coverage) {
+    const auto it =
+        std::find_if(curve.begin(), curve.end(), [&](double c) { return c >= coverage; });
+    return it == curve.end() ? 1000 : static_cast<std::size_t>(it - curve.begin()) + 1;
+}
+
+TEST(Baselines, WithForesightFewViewsCoverTheRoomTheLargestFirst) {
+    Loop loop = roomLoop();
+    const CoverageJudge judge = loop.judge(0.1);
+    BaselineOptions options;
+    options.poses = 3000;
+    loop.run(*makeForesight(judge, loop.caster(), options, 1), 100);
+    EXPECT_TRUE(loop.ended());
+    const std::vector<double> curve = loop.curve(0.1);
+    EXPECT_GT(curve.back(), 0.995) << curve.size() << " views";
+    for (const char* name : {"random", "octomap_frontier"}) {
+        Loop other = roomLoop();
+        other.run(*makeBaseline(name, {}, kNoTarget, 1), 60);
+        EXPECT_LT(viewsTo(curve, 0.9), viewsTo(other.curve(0.1), 0.9)) << name;
+    }
+    // What is picked by its gain cannot gain more later on; places it is picked by are a sample.
+    for (std::size_t i = 3; i < curve.size(); ++i) {
+        EXPECT_LT(curve[i] - curve[i - 1], curve[i - 1] - curve[i - 2] + 0.02) << "view " << i;
+    }
+}
+
+TEST(Baselines, ForesightIsTheSameForTheSameSeedAndAnyNumberOfThreads) {
+    std::vector<std::vector<Pose>> runs;
+    for (const std::size_t threads : {1U, 2U}) {
+        const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+        Loop loop = roomLoop();
+        const CoverageJudge judge = loop.judge(0.1);
+        BaselineOptions options;
+        options.poses = 300;
+        loop.run(*makeForesight(judge, loop.caster(), options, 5), 8);
+        runs.push_back(loop.views());
+    }
+    ASSERT_EQ(runs[0].size(), runs[1].size());
+    for (std::size_t i = 0; i < runs[0].size(); ++i) {
+        EXPECT_EQ(runs[0][i].translation, runs[1][i].translation);
+        EXPECT_EQ(runs[0][i].rotation, runs[1][i].rotation);
+    }
 }
 
 TEST(Baselines, RandomViewsCoverTheRoomInTheEnd) {

@@ -19,7 +19,16 @@ namespace riftmap {
 
 /// Section [Explore].
 struct ExploreOptions {
-    enum class Planner { kRiftmap, kPaper, kRandom, kOrbit, kLawnmower, kSphere, kOctomapFrontier };
+    enum class Planner {
+        kRiftmap,
+        kPaper,
+        kRandom,
+        kOrbit,
+        kLawnmower,
+        kSphere,
+        kOctomapFrontier,
+        kForesight
+    };
 
     Planner planner = Planner::kRiftmap;
     bool knownBox = false;  ///< the planner is told the box of an object that stands alone

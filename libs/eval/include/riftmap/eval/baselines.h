@@ -37,6 +37,7 @@ struct BaselineOptions {
     double spacing = 1.5;   ///< between the stops of the lawn-mower [m]
     double resolution = 0;  ///< of the OctoMap [m]; 0 = 10 cm, with a target 1/25 of its side
     double minGain = 0.01;  ///< octomap_frontier ends below this share of a full view's voxels
+    int poses = 20000;      ///< that foresight picks from
     void describe(OptionTable& table);
 };
 
@@ -64,6 +65,19 @@ const std::vector<std::string>& baselineNames();
 /// Throws std::invalid_argument for another name, and for `sphere` without a target.
 std::unique_ptr<ViewSource> makeBaseline(const std::string& name, const BaselineOptions& options,
                                          const Eigen::AlignedBox3d& target, std::uint64_t seed);
+
+class CoverageJudge;
+class RayCaster;
+
+/// Not a way to explore but a measure of how well one can: knows the surface, and takes, of
+/// `options.poses` poses at random that the camera can reach, always the one that shows most of the
+/// judge's observable samples that no view has shown (20,000 of them at most); greedy maximum
+/// coverage, which no choice of as many of these views betters by more than 1 / (1 - 1/e)
+/// (Nemhauser, Wolsey & Fisher, Math. Programming 14, 1978). Ends when none shows any. Ways do not
+/// count. `judge` and `caster` must outlive it. The first call takes seconds, and some 10 kB a
+/// pose.
+std::unique_ptr<ViewSource> makeForesight(const CoverageJudge& judge, const RayCaster& caster,
+                                          const BaselineOptions& options, std::uint64_t seed);
 
 /// A way from a to b inside the limits' box over a lattice of `step` [m], shortened; a is left out,
 /// b is the last. Nothing if there is none after `maxNodes` of the lattice.
