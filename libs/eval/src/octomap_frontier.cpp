@@ -60,9 +60,7 @@ class VoxelGrid {
         return (v.array() >= 0).all() && (v.array() < size_.array()).all();
     }
     Voxel at(const Eigen::Vector3i& v) const {
-        return inside(v) ? static_cast<Voxel>(voxels_[static_cast<std::size_t>(
-                               (v.z() * size_.y() + v.y()) * size_.x() + v.x())])
-                         : outside_;
+        return inside(v) ? static_cast<Voxel>(voxels_[flat(v)]) : outside_;
     }
     Voxel at(const Eigen::Vector3d& p) const { return at(voxelOf(p)); }
 
@@ -107,7 +105,9 @@ class VoxelGrid {
 
  private:
     std::size_t flat(const Eigen::Vector3i& v) const {
-        return static_cast<std::size_t>((v.z() * size_.y() + v.y()) * size_.x() + v.x());
+        const Eigen::Matrix<std::size_t, 3, 1> at = v.cast<std::size_t>();
+        const Eigen::Matrix<std::size_t, 3, 1> size = size_.cast<std::size_t>();
+        return (at.z() * size.y() + at.y()) * size.x() + at.x();
     }
     Eigen::Vector3i voxelOf(const Eigen::Vector3d& p) const {
         return ((p - min_) / resolution_).array().floor().cast<int>();

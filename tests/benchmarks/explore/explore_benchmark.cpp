@@ -26,7 +26,7 @@ namespace fs = std::filesystem;
 struct Run {
     std::string name;  ///< WORLD.NOISE.PLANNER.START
     std::vector<std::string> arguments;
-    double minutes;  ///< on two cores, about
+    double minutes = 0;  ///< on two cores, about
 };
 
 struct World {
