@@ -113,9 +113,9 @@ class Knowledge {
     /// Box of the surfaces, if it was declared.
     const std::optional<Eigen::AlignedBox3d>& surfaceBox() const { return surfaceBox_; }
     /// What a view has to promise to be worth it [m^2]: PlannerOptions::minGain of the surface
-    /// known, or if that is 0 a share of 0.0005, with exact depth 0.0001, with
+    /// known, or if that is 0 a share of 0.0004, with exact depth 0.0001, with
     /// DepthKind::kPixelwise 0.0007; where the box of the surfaces is known 0.0003, 0.0004 and
-    /// 0.0005.
+    /// 0.00048.
     double minGain() const;
     /// True if this place was seen through and no surface of the map is within the platform's
     /// clearance, whether or not a way there is known. Thread-safe while nothing changes.
