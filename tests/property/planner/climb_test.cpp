@@ -17,13 +17,7 @@ const Eigen::Vector3d kHalf(2.5, 2.0, 1.4);
 
 /// The inside of a room with a pillar.
 std::optional<double> insideRoom(const Eigen::Vector3d& origin, const Eigen::Vector3d& ray) {
-    double nearest = 100;
-    for (int axis = 0; axis < 3; ++axis) {
-        if (ray[axis] != 0) {
-            const double side = ray[axis] > 0 ? kHalf[axis] : -kHalf[axis];
-            nearest = std::min(nearest, (side - origin[axis]) / ray[axis]);
-        }
-    }
+    double nearest = test::insideBox(kHalf, origin, ray);
     const Eigen::Vector2d to = origin.head<2>() - Eigen::Vector2d(1.2, 0.5);
     const double a = ray.head<2>().squaredNorm();
     const double b = to.dot(ray.head<2>());

@@ -2,6 +2,7 @@
 // Views of simple surfaces with exact depth.
 #pragma once
 
+#include <algorithm>
 #include <functional>
 #include <optional>
 
@@ -55,6 +56,19 @@ inline std::function<std::optional<double>(const Eigen::Vector3d&, const Eigen::
         }
         return (at - origin.x()) / direction.x();
     };
+}
+
+/// The inside of a box around the origin, from a place in it; half its edges.
+inline double insideBox(const Eigen::Vector3d& half, const Eigen::Vector3d& origin,
+                        const Eigen::Vector3d& direction) {
+    double nearest = 100;
+    for (int axis = 0; axis < 3; ++axis) {
+        if (direction[axis] != 0) {
+            const double side = direction[axis] > 0 ? half[axis] : -half[axis];
+            nearest = std::min(nearest, (side - origin[axis]) / direction[axis]);
+        }
+    }
+    return nearest;
 }
 
 }  // namespace riftmap::test

@@ -18,14 +18,7 @@ const Eigen::Vector3d kHalf(2.5, 2.5, 1.5);
 
 /// The inside of a room.
 std::optional<double> insideRoom(const Eigen::Vector3d& origin, const Eigen::Vector3d& ray) {
-    double nearest = 100;
-    for (int axis = 0; axis < 3; ++axis) {
-        if (ray[axis] != 0) {
-            const double side = ray[axis] > 0 ? kHalf[axis] : -kHalf[axis];
-            nearest = std::min(nearest, (side - origin[axis]) / ray[axis]);
-        }
-    }
-    return nearest;
+    return test::insideBox(kHalf, origin, ray);
 }
 
 GraphOptions graphOptions() {
