@@ -58,10 +58,6 @@ Eigen::Vector3i FreeSpace::coordinates(std::size_t index) const {
             static_cast<int>(index / nx / ny)};
 }
 
-Eigen::Vector3i FreeSpace::voxelOf(const Eigen::Vector3d& point) const {
-    return ((point - origin_) / voxel_).array().floor().cast<int>();
-}
-
 Eigen::Vector3d FreeSpace::snap(const Eigen::Vector3d& point) const {
     return centre(voxelOf(point));
 }

@@ -34,6 +34,12 @@ ViewScorer::Weights weightsFor(const Knowledge& k, const ObjectMemory& memory) {
     return weights;
 }
 
+/// From one place in the box towards another as far as it lies in there, axis by axis.
+Eigen::Vector3d movedWithin(const Eigen::AlignedBox3d& box, const Eigen::Vector3d& from,
+                            const Eigen::Vector3d& to) {
+    return (to.array() >= box.min().array() && to.array() <= box.max().array()).select(to, from);
+}
+
 }  // namespace
 
 Eigen::Vector3d anyPerpendicular(const Eigen::Vector3d& n) {
@@ -206,8 +212,9 @@ void Choice::keepPool() {
     }
 }
 
-/// So many changes of a view. At a scale of 1 it is moved by up to two voxels an axis (one in three
-/// is not, nor is a view from where the camera is) and turned by some 10 degrees.
+/// So many changes of a view. At a scale of 1 it is moved by up to two voxels an axis (four in ten
+/// are not, nor is a view from where the camera is), but along no axis out of its box (on wheels it
+/// is a few voxels high), and turned by some 10 degrees.
 void Choice::vary(const Candidate& view, int count, double scale) {
     const Pose pose = view.pose;
     const double reach = scale * 2.0 * k_.space().voxelSize();
@@ -217,9 +224,9 @@ void Choice::vary(const Candidate& view, int count, double scale) {
         const Eigen::Vector3d turn =
             scale * 0.25 * Eigen::Vector3d(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1));
         const bool stay = view.path == 0.0 || i % 3 == 0;
-        const Eigen::Vector3d eye =
-            stay ? pose.translation : Eigen::Vector3d(pose.translation + reach * shift);
-        const auto place = k_.placeAt(eye);
+        const Eigen::Vector3d moved = pose.translation + reach * shift;
+        const auto place = k_.placeAt(stay ? pose.translation
+                                           : movedWithin(k_.cameraBox(), pose.translation, moved));
         if (!place) {
             continue;
         }
@@ -240,7 +247,7 @@ void Choice::rate(Candidate& c, const ViewScore& score) const {
 }
 
 void Choice::scoreFrom(std::size_t first) {
-    parallelForEach(candidates_.size() - first, 4, [&](std::size_t i) {
+    parallelForEach(candidates_.size() - first, 1, [&](std::size_t i) {
         Candidate& c = candidates_[first + i];
         rate(c, k_.surfaceBox() ? scoreAround(c.pose)
                 : c.drawing     ? scorer_.score(*c.drawing)
@@ -252,11 +259,11 @@ void Choice::scoreFrom(std::size_t first) {
 /// Where there are more open cells than can be weighed for every candidate, those that an estimate
 /// likes best are left.
 void Choice::preselect() {
-    constexpr std::size_t kLeft = 64;
+    constexpr std::size_t kLeft = 48;
     if (!scorer_.samples() || candidates_.size() <= kLeft) {
         return;
     }
-    parallelForEach(candidates_.size(), 4, [&](std::size_t i) {
+    parallelForEach(candidates_.size(), 1, [&](std::size_t i) {
         Candidate& c = candidates_[i];
         c.drawing = scorer_.draw(c.pose);
         rate(c, scorer_.estimate(*c.drawing));
@@ -273,7 +280,7 @@ void Choice::climb() {
     constexpr double kWidest = 4;  // scale of the changes
     constexpr double kFinest = 0.5;
     constexpr std::size_t kViews = 2;
-    constexpr int kChanges = 12;
+    constexpr int kChanges = 10;
     for (int round = 0; round < kRounds; ++round) {
         const double scale = kWidest * std::pow(kFinest / kWidest, round / (kRounds - 1.0));
         const std::size_t first = candidates_.size();

@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "riftmap/core/parallel.h"
+#include "riftmap/core/whole.h"
 #include "riftmap/planner/seen_through.h"
 
 namespace riftmap {
@@ -44,12 +45,6 @@ struct Sums {
 };
 
 constexpr int kParts = 4;  ///< of a cell, along each axis
-
-/// The largest whole number that is no larger: std::floor() is a call without SSE 4.1.
-int wholeBelow(float x) {
-    const int towardsZero = static_cast<int>(x);
-    return towardsZero - (x < static_cast<float>(towardsZero) ? 1 : 0);
-}
 
 /// In SurfaceCell::parts.
 std::uint64_t partBit(const Eigen::Vector3i& part) {
@@ -209,7 +204,7 @@ SurfaceSummary::SurfaceSummary(double cell, double resolution)
 }
 
 std::uint64_t SurfaceSummary::keyOf(const Eigen::Vector3d& point) const {
-    return pack((point / cell_).array().floor().cast<int>());
+    return pack(wholesBelow(point / cell_));
 }
 
 std::uint64_t SurfaceSummary::blockOf(std::uint64_t cell) {
@@ -293,7 +288,7 @@ bool SurfaceSummary::openTowards(const Eigen::Vector3f& place, const Eigen::Vect
     const Block* block = nullptr;
     for (float s = kFirst; s < end;) {
         const Eigen::Vector3f p = start + s * out;
-        const Eigen::Vector3i part = p.unaryExpr([](float x) { return wholeBelow(x); });
+        const Eigen::Vector3i part = wholesBelow(p);
         const Eigen::Vector3i now = part.unaryExpr([](int x) { return x >> 5; });
         if (now != at) {
             at = now;
@@ -330,16 +325,21 @@ std::vector<std::uint64_t> SurfaceSummary::blocksSeen(const View& view) const {
     Eigen::Vector3i lastLow = Eigen::Vector3i::Constant(kOffset);
     Eigen::Vector3i lastHigh = lastLow;
     const DisparityImage& d = view.disparity;
+    // A disparity of 0 is valid and infinitely far off: no vertex, and in no block.
+    const double farthest = 0.5 * kOffset * cell_;
     for (int row = 0; row < d.height; row += 2) {
         for (int column = 0; column < d.width; column += 2) {
             if (!d.valid(column, row)) {
                 continue;
             }
-            const Eigen::Vector3d p =
-                view.world_T_camera *
+            const Eigen::Vector3d inCamera =
                 view.camera.backProject(column, row, static_cast<double>(d.at(column, row)));
-            const Eigen::Vector3i low = ((p.array() - resolution_) / side).floor().cast<int>();
-            const Eigen::Vector3i high = ((p.array() + resolution_) / side).floor().cast<int>();
+            if (!(inCamera.norm() < farthest)) {
+                continue;
+            }
+            const Eigen::Vector3d p = view.world_T_camera * inCamera;
+            const Eigen::Vector3i low = wholesBelow((p.array() - resolution_) / side);
+            const Eigen::Vector3i high = wholesBelow((p.array() + resolution_) / side);
             if (low == lastLow && high == lastHigh) {
                 continue;
             }
@@ -463,15 +463,15 @@ SurfaceSummary::Block SurfaceSummary::build(const PixelGraph& graph, std::uint64
     graph.forEachVertexIn(min.cast<float>(), max.cast<float>(), [&](VertexId id) {
         const Vertex v = graph.vertex(id);
         const Eigen::Vector3d p = v.position.cast<double>();
-        const Eigen::Vector3i at = (p / cell_).array().floor().cast<int>().matrix() - corner;
+        const Eigen::Vector3d inCells = p / cell_;
+        const Eigen::Vector3i cell = wholesBelow(inCells);
+        const Eigen::Vector3i at = cell - corner;
         if ((at.array() < 0).any() || (at.array() >= n).any()) {
             return;  // on the outer face: belongs to the next block
         }
         Sums& s = sumsAt(at.x(), at.y(), at.z());
         ++s.vertices;
-        const Eigen::Array3d inCells = p.array() / cell_;
-        s.parts |=
-            partBit(((kParts * inCells).floor() - kParts * inCells.floor()).cast<int>().matrix());
+        s.parts |= partBit(wholesBelow(kParts * inCells) - kParts * cell);
         s.position += p;
         s.normal += v.normal.cast<double>();
         if (v.open == 0) {

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "riftmap/core/parallel.h"
+#include "riftmap/core/whole.h"
 
 namespace riftmap {
 
@@ -80,7 +81,7 @@ bool ThinShells::touch(const Eigen::Vector3d& place) const {
 }
 
 Eigen::Vector3i ThinShells::voxelOf(const Eigen::Vector3d& place) const {
-    return ((place - origin_) / voxel_).array().floor().cast<int>();
+    return wholesBelow((place - origin_) / voxel_);
 }
 
 /// To the 26 sides, through the space that is known, from a free voxel before this one.

@@ -8,6 +8,7 @@
 #include <map>
 
 #include "riftmap/core/parallel.h"
+#include "riftmap/core/whole.h"
 #include "square_kernel.h"
 
 namespace riftmap {
@@ -24,7 +25,9 @@ constexpr float kNearest = 0.05F;  ///< [m] before the camera: nothing nearer is
 
 struct ViewScorer::DepthBuffer {
     int width = 0, height = 0;
-    float fx = 0, fy = 0, cx = 0, cy = 0;  ///< [px of the buffer]
+    float fx = 0, fy = 0, cx = 0, cy = 0;            ///< [px of the buffer]
+    float left = 0, top = 0, right = 0, bottom = 0;  ///< of what is seen [px of the buffer]
+    float nearest = 0, farthest = 0;                 ///< what is seen [m]
     std::vector<float> depth;
 
     float& at(int column, int row) {
@@ -35,12 +38,31 @@ struct ViewScorer::DepthBuffer {
         return depth[static_cast<std::size_t>(row) * static_cast<std::size_t>(width) +
                      static_cast<std::size_t>(column)];
     }
-    SquareCamera squares(const Pose& camera_T_world, float half, double farLimit) const;
+    SquareCamera squares(const Pose& camera_T_world, float half) const;
+    /// Depth that is drawn where this place is in the image [m]; nothing if it is out of range or
+    /// of the true field of view.
+    std::optional<float> drawnAt(const Eigen::Vector3f& inCamera) const {
+        if (!(inCamera.z() >= nearest && inCamera.z() <= farthest)) {
+            return std::nullopt;
+        }
+        const float u = fx * inCamera.x() / inCamera.z() + cx;
+        const float v = fy * inCamera.y() / inCamera.z() + cy;
+        if (!(u >= left && u <= right && v >= top && v <= bottom)) {
+            return std::nullopt;
+        }
+        // What is left over of an image of no whole number of them belongs to the last.
+        return at(std::min(static_cast<int>(u + 0.5F), width - 1),
+                  std::min(static_cast<int>(v + 0.5F), height - 1));
+    }
+    /// In the image, and nothing drawn more than `slack` before it.
+    bool visible(const Eigen::Vector3f& inCamera, float slack) const {
+        const std::optional<float> drawn = drawnAt(inCamera);
+        return drawn && *drawn >= inCamera.z() - slack;
+    }
 };
 
 /// What squares are drawn with into this buffer; half their edge in metres.
-SquareCamera ViewScorer::DepthBuffer::squares(const Pose& camera_T_world, float half,
-                                              double farLimit) const {
+SquareCamera ViewScorer::DepthBuffer::squares(const Pose& camera_T_world, float half) const {
     SquareCamera c;
     c.rotation = camera_T_world.rotation.cast<float>();
     c.translation = camera_T_world.translation.cast<float>();
@@ -50,7 +72,7 @@ SquareCamera ViewScorer::DepthBuffer::squares(const Pose& camera_T_world, float 
     c.cy = cy;
     c.half = half;
     c.nearest = kNearest;
-    c.farthest = static_cast<float>(farLimit);
+    c.farthest = farthest;
     c.width = width;
     c.height = height;
     return c;
@@ -124,12 +146,8 @@ ViewScorer::ViewScorer(const SensorModel& sensor, const SurfaceSummary& summary,
     }
     groupBlocks();
     openCells_.resize(open_.size());
-    parallelForEach(open_.size(), 256, [&](std::size_t i) {
-        const SurfaceCell& cell = open_[i]->cell;
-        openCells_[i] = {cell.openPosition,
-                         cell.hidden > 0 ? cell.hiddenPosition : cell.openPosition,
-                         leftAfterTries(*open_[i])};
-    });
+    parallelForEach(open_.size(), 256,
+                    [&](std::size_t i) { openCells_[i] = openCellOf(*open_[i]); });
 }
 
 void ViewScorer::groupBlocks() {
@@ -137,8 +155,7 @@ void ViewScorer::groupBlocks() {
     std::map<std::array<int, 3>, std::size_t> index;
     for (std::size_t i = 0; i < blocks_.size(); ++i) {
         const Eigen::AlignedBox3f box = blocks_[i].block->box.cast<float>();
-        const Eigen::Vector3i at =
-            (blocks_[i].centre / (kBlocks * box.sizes().x())).array().floor().cast<int>();
+        const Eigen::Vector3i at = wholesBelow(blocks_[i].centre / (kBlocks * box.sizes().x()));
         const auto [it, isNew] = index.try_emplace({at.x(), at.y(), at.z()}, groups_.size());
         if (isNew) {
             groups_.emplace_back();
@@ -174,33 +191,60 @@ double ViewScorer::besideRim(const SurfaceCell& cell) const {
 
 /// Whether nothing before what the cell hides (gapsByLine; else nothing close before it) is in the
 /// way of the cameras: of both, but for exact depth, which needs no partner.
-bool ViewScorer::openTo(const SurfaceCell& cell, const Pose& world_T_camera) const {
+bool ViewScorer::openTo(const OpenCell& cell, const Pose& world_T_camera) const {
     constexpr float kClose = 4;  // [cells]
     const float reach = weights_.gapsByLine ? kFar : kClose;
     const auto open = [&](const Eigen::Vector3d& eye) {
-        return summary_->openTowards(cell.hiddenPosition, eye.cast<float>(), reach);
+        return summary_->openTowards(cell.wanted, eye.cast<float>(), reach);
     };
     return open(world_T_camera.translation) &&
            (sensor_.exactDepth() ||
             open(world_T_camera * Eigen::Vector3d(sensor_.camera.baseline, 0, 0)));
 }
 
-ViewScorer::Benefit ViewScorer::benefit(const RiftRecord& record,
-                                        const Pose& world_T_camera) const {
-    return benefit(record, leftAfterTries(record), world_T_camera, true);
+ViewScorer::OpenCell ViewScorer::openCellOf(const RiftRecord& record) const {
+    const SurfaceCell& cell = record.cell;
+    const auto direction = [](const Eigen::Vector3d& facing) -> Eigen::Vector3d {
+        constexpr double kClear = 0.3;  // a shorter mean is of normals that cancel: any side may do
+        return facing.norm() > kClear ? facing.normalized() : Eigen::Vector3d::Zero();
+    };
+    OpenCell c;
+    c.record = &record;
+    c.open = cell.openPosition;
+    c.wanted = cell.hidden > 0 ? cell.hiddenPosition : cell.openPosition;
+    c.hides = cell.hidden > 0;
+    c.tried = !record.attempts.empty();
+    c.vain = leftAfterTries(record);
+    c.torn = weights_.hidden * static_cast<double>(cell.hidden) + besideRim(cell);
+    c.coarse = weights_.coarse * static_cast<double>(cell.coarse);
+    // What a gap hides faces as the gap does. At other silhouettes the surface bends away over the
+    // rim: what is to be seen faces outwards too, the more so if views from where the rim's own
+    // surface is seen well were in vain.
+    Eigen::Vector3d facing = cell.openNormal.cast<double>();
+    if ((cell.kinds & kDepthStep) != 0) {
+        const double over = 0.7 * (1.0 + static_cast<double>(record.attempts.size()));
+        facing += over * cell.outward.cast<double>();
+    }
+    c.facing = direction(facing);
+    c.hiddenFacing = direction(cell.hiddenNormal.cast<double>());
+    return c;
 }
 
-ViewScorer::Benefit ViewScorer::benefit(const RiftRecord& record, double vain,
-                                        const Pose& world_T_camera, bool withLines) const {
+ViewScorer::Benefit ViewScorer::benefit(const RiftRecord& record,
+                                        const Pose& world_T_camera) const {
+    return benefit(openCellOf(record), world_T_camera, true);
+}
+
+ViewScorer::Benefit ViewScorer::benefit(const OpenCell& cell, const Pose& world_T_camera,
+                                        bool withLines) const {
     const Eigen::Vector3d& eye = world_T_camera.translation;
-    if (RiftLedger::tried(record, eye)) {
+    if (cell.tried && RiftLedger::tried(*cell.record, eye)) {
         return {};
     }
-    const Eigen::Vector3d ray = eye - record.cell.openPosition.cast<double>();
+    const Eigen::Vector3d ray = eye - cell.open.cast<double>();
     const double distance = ray.norm();
     const auto angleTo = [&](const Eigen::Vector3d& facing) {
-        constexpr double kClear = 0.3;  // a shorter mean is of normals that cancel: any side may do
-        return facing.norm() > kClear ? ray.dot(facing.normalized()) / distance : 0.6;
+        return facing.isZero(0) ? 0.6 : ray.dot(facing) / distance;
     };
     const auto qualityOn = [&](const Eigen::Vector3d& facing) {
         const double angle = angleTo(facing);
@@ -208,22 +252,13 @@ ViewScorer::Benefit ViewScorer::benefit(const RiftRecord& record, double vain,
         return sensor_.matched() ? std::clamp((angle - 0.2) / 0.35, 0.0, 1.0)
                                  : std::clamp((angle - 0.15) / 0.1, 0.0, 1.0);
     };
-    // What a gap hides faces as the gap does. At other silhouettes the surface bends away over the
-    // rim: what is to be seen faces outwards too, the more so if views from where the rim's own
-    // surface is seen well were in vain.
-    Eigen::Vector3d facing = record.cell.openNormal.cast<double>();
-    if ((record.cell.kinds & kDepthStep) != 0) {
-        const double over = 0.7 * (1.0 + static_cast<double>(record.attempts.size()));
-        facing += over * record.cell.outward.cast<double>();
-    }
-    const double coarseQuality = qualityOn(facing);
+    const double coarseQuality = qualityOn(cell.facing);
     double tornQuality = coarseQuality;
-    if (record.cell.hidden > 0) {
-        const Eigen::Vector3d hidden = record.cell.hiddenNormal.cast<double>();
+    if (cell.hides) {
         // Along open lines about so much of what the dragon's gaps hid was seen.
         const bool hint = weights_.gapsByLine && !sensor_.matched();
-        tornQuality = hint ? 0.5 * (1 + angleTo(hidden)) : qualityOn(hidden);
-        if (withLines && tornQuality > 0 && !openTo(record.cell, world_T_camera)) {
+        tornQuality = hint ? 0.5 * (1 + angleTo(cell.hiddenFacing)) : qualityOn(cell.hiddenFacing);
+        if (withLines && tornQuality > 0 && !openTo(cell, world_T_camera)) {
             tornQuality = 0;
         }
     }
@@ -231,16 +266,13 @@ ViewScorer::Benefit ViewScorer::benefit(const RiftRecord& record, double vain,
     // view measures well.
     const double torn = newSurfaceShare(distance);
     const double coarse = std::clamp((1.6 * goodDepth_ - distance) / (0.6 * goodDepth_), 0.0, 1.0);
-    const double tornArea =
-        weights_.hidden * static_cast<double>(record.cell.hidden) + besideRim(record.cell);
-    const double coarseArea = weights_.coarse * static_cast<double>(record.cell.coarse);
     Benefit result;
-    result.torn = tornQuality * vain * torn;
-    result.coarse = coarseQuality * vain * coarse;
-    result.coarseArea = result.coarse * coarseArea;
-    result.area = result.torn * tornArea + result.coarseArea;
-    result.quality = result.torn * tornArea > 0.3 * result.coarseArea ? tornQuality * torn
-                                                                      : coarseQuality * coarse;
+    result.torn = tornQuality * cell.vain * torn;
+    result.coarse = coarseQuality * cell.vain * coarse;
+    result.coarseArea = result.coarse * cell.coarse;
+    result.area = result.torn * cell.torn + result.coarseArea;
+    result.quality = result.torn * cell.torn > 0.3 * result.coarseArea ? tornQuality * torn
+                                                                       : coarseQuality * coarse;
     return result;
 }
 
@@ -254,8 +286,17 @@ std::shared_ptr<const ViewScorer::Drawing> ViewScorer::draw(const Pose& world_T_
     b.height = std::max(1, c.height / kPixels);
     b.fx = static_cast<float>(c.fx / kPixels);
     b.fy = static_cast<float>(c.fy / kPixels);
-    b.cx = static_cast<float>((c.cx + 0.5) / kPixels - 0.5);
-    b.cy = static_cast<float>((c.cy + 0.5) / kPixels - 0.5);
+    const auto inBuffer = [](double pixel) {
+        return static_cast<float>((pixel + 0.5) / kPixels - 0.5);
+    };
+    b.cx = inBuffer(c.cx);
+    b.cy = inBuffer(c.cy);
+    b.left = inBuffer(sensor_.firstColumn + kMargin);
+    b.top = inBuffer(kMargin);
+    b.right = inBuffer(c.width - 1 - kMargin);
+    b.bottom = inBuffer(c.height - 1 - kMargin);
+    b.nearest = std::max(static_cast<float>(1.02 * sensor_.nearLimit), kNearest);
+    b.farthest = static_cast<float>(sensor_.farLimit);
     b.depth.assign(static_cast<std::size_t>(b.width) * static_cast<std::size_t>(b.height), kFar);
     const Pose camera_T_world = world_T_camera.inverse();
     const Eigen::Matrix3f rotation = camera_T_world.rotation.cast<float>();
@@ -284,7 +325,7 @@ std::shared_ptr<const ViewScorer::Drawing> ViewScorer::draw(const Pose& world_T_
         }
     }
     std::sort(seen.begin(), seen.end());
-    SquareDrawer drawer(b.squares(camera_T_world, half, sensor_.farLimit), b.depth);
+    SquareDrawer drawer(b.squares(camera_T_world, half), b.depth);
     for (const BlockView* block : seen) {
         drawer.add(block->block->positions);
     }
@@ -329,33 +370,6 @@ double ViewScorer::nearShareOf(const DepthBuffer& buffer) const {
     return static_cast<double>(nearPixels) / ((buffer.width - firstColumn) * buffer.height);
 }
 
-/// Depth that is drawn where this place is in the image [m]; nothing if it is out of range or of
-/// the true field of view.
-std::optional<float> ViewScorer::drawnAt(const DepthBuffer& buffer,
-                                         const Eigen::Vector3f& inCamera) const {
-    const Eigen::Vector3d p = inCamera.cast<double>();
-    constexpr auto kLeast = static_cast<double>(kNearest);
-    if (p.z() < std::max(1.02 * sensor_.nearLimit, kLeast) || p.z() > sensor_.farLimit) {
-        return std::nullopt;
-    }
-    const StereoCamera& camera = sensor_.camera;
-    const Eigen::Vector2d uv = camera.project(p);
-    if (uv.x() < sensor_.firstColumn + kMargin || uv.x() > camera.width - 1 - kMargin ||
-        uv.y() < kMargin || uv.y() > camera.height - 1 - kMargin) {
-        return std::nullopt;
-    }
-    const int column = std::clamp(static_cast<int>(uv.x()) / kPixels, 0, buffer.width - 1);
-    const int row = std::clamp(static_cast<int>(uv.y()) / kPixels, 0, buffer.height - 1);
-    return buffer.at(column, row);
-}
-
-/// In the image, and nothing drawn more than `slack` before it.
-bool ViewScorer::visible(const DepthBuffer& buffer, const Eigen::Vector3f& inCamera,
-                         float slack) const {
-    const std::optional<float> depth = drawnAt(buffer, inCamera);
-    return depth && *depth >= inCamera.z() - slack;
-}
-
 ViewScore ViewScorer::estimate(const Drawing& drawing) const {
     return scoreEvery((open_.size() + kMostOpen - 1) / kMostOpen, 2 * kRayStride, drawing);
 }
@@ -370,28 +384,26 @@ ViewScore ViewScorer::scoreEvery(std::size_t stride, int rayStride, const Drawin
     ViewScore result;
     const Pose& world_T_camera = drawing.world_T_camera;
     const Pose camera_T_world = world_T_camera.inverse();
+    const Eigen::Matrix3f rotation = camera_T_world.rotation.cast<float>();
+    const Eigen::Vector3f translation = camera_T_world.translation.cast<float>();
     const DepthBuffer& buffer = drawing.buffer;
     result.nearShare = nearShareOf(buffer);
-    const StereoCamera& camera = sensor_.camera;
-    const double cell = summary_->cellSize();
+    const auto slack = static_cast<float>(2.0 * summary_->cellSize());
     double seenWell = 0;  // [m^2] of openGain
     for (const BlockView* block : drawing.seen) {
         const std::size_t first = (block->firstOpen + stride - 1) / stride * stride;
         for (std::size_t i = first; i < block->lastOpen; i += stride) {
-            const Eigen::Vector3f p =
-                (camera_T_world * openCells_[i].open.cast<double>()).cast<float>();
-            if (!visible(buffer, p, static_cast<float>(2.0 * cell))) {
+            if (!buffer.visible(rotation * openCells_[i].open + translation, slack)) {
                 continue;
             }
-            const RiftRecord& record = *open_[i];
-            const Benefit b = benefit(record, openCells_[i].vain, world_T_camera, true);
+            const Benefit b = benefit(openCells_[i], world_T_camera, true);
             if (b.area <= 0) {
                 continue;
             }
             result.openGain += static_cast<double>(stride) * b.area;
             result.coarseGain += static_cast<double>(stride) * b.coarseArea;
             const bool well = b.quality > 0.5;
-            (well ? result.cells : result.badlySeen).push_back(record.cell.key);
+            (well ? result.cells : result.badlySeen).push_back(openCells_[i].record->cell.key);
             seenWell += well ? static_cast<double>(stride) * b.area : 0.0;
         }
     }
@@ -399,7 +411,7 @@ ViewScore ViewScorer::scoreEvery(std::size_t stride, int rayStride, const Drawin
     if (seenWell >= 0.5 * result.openGain) {
         result.badlySeen.clear();
     }
-    const double side = static_cast<double>(kPixels * rayStride) / camera.fx;
+    const double side = static_cast<double>(kPixels * rayStride) / sensor_.camera.fx;
     forEachUnknown(world_T_camera, buffer, rayStride, [&](const Eigen::Vector3d& p, double depth) {
         result.unknownGain += side * side * depth * depth * newSurfaceShare(depth) *
                               (weights_.byExperience ? space_->lookWorth(p) : 1.0);
@@ -428,10 +440,9 @@ void ViewScorer::setFrontier(std::vector<FreeSpace::Frontier> frontier, double e
 std::vector<float> ViewScorer::worth() const {
     std::vector<float> worth;
     worth.reserve(2 * (open_.size() + frontier_.size()));
-    for (const RiftRecord* record : open_) {
-        worth.push_back(static_cast<float>(
-            weights_.hidden * static_cast<double>(record->cell.hidden) + besideRim(record->cell)));
-        worth.push_back(static_cast<float>(weights_.doubt) * record->cell.doubt);
+    for (const OpenCell& cell : openCells_) {
+        worth.push_back(static_cast<float>(cell.torn));
+        worth.push_back(static_cast<float>(weights_.doubt) * cell.record->cell.doubt);
     }
     for (const FreeSpace::Frontier& f : frontier_) {
         const float area = static_cast<float>(weights_.unknown) * f.area.norm();
@@ -459,7 +470,7 @@ ViewScorer::Seen ViewScorer::sights(const Pose& world_T_camera) const {
 void ViewScorer::dropHidden(std::vector<Sight>& sights, std::vector<std::uint32_t>& gaps,
                             const Pose& world_T_camera) const {
     settleSights(sights, gaps, [&](const Sight& gap) {
-        return openTo(open_[gap.item / 2]->cell, world_T_camera);
+        return openTo(openCells_[gap.item / 2], world_T_camera);
     });
 }
 
@@ -472,8 +483,7 @@ ViewScorer::Seen ViewScorer::sightsAtMost(const Pose& world_T_camera) const {
     const Eigen::Matrix3f rotation = camera_T_world.rotation.cast<float>();
     const Eigen::Vector3f translation = camera_T_world.translation.cast<float>();
     const auto voxel = static_cast<float>(frontierEdge_);
-    SquareDrawer drawer(buffer.squares(camera_T_world, 0.5F * voxel, sensor_.farLimit),
-                        buffer.depth);
+    SquareDrawer drawer(buffer.squares(camera_T_world, 0.5F * voxel), buffer.depth);
     drawer.add(frontierCentres_);
     drawer.finish();
     const auto put = [&](std::size_t item, double share) {
@@ -485,17 +495,17 @@ ViewScorer::Seen ViewScorer::sightsAtMost(const Pose& world_T_camera) const {
     for (const BlockView* block : drawing->seen) {
         for (std::size_t i = block->firstOpen; i < block->lastOpen; ++i) {
             const Eigen::Vector3f p = rotation * openCells_[i].wanted + translation;
-            const std::optional<float> depth = drawnAt(buffer, p);
+            const std::optional<float> depth = buffer.drawnAt(p);
             if (!depth) {
                 continue;
             }
-            const SurfaceCell& cell = open_[i]->cell;
+            const OpenCell& cell = openCells_[i];
             const bool inSight = *depth >= p.z() - margin;
-            if (inSight || (weights_.gapsByLine && cell.hidden > 0)) {
-                const Benefit b = benefit(*open_[i], openCells_[i].vain, world_T_camera, false);
+            if (inSight || (weights_.gapsByLine && cell.hides)) {
+                const Benefit b = benefit(cell, world_T_camera, false);
                 const std::size_t count = result.sights.size();
                 put(2 * i, b.torn);
-                if (cell.hidden > 0 && result.sights.size() > count) {
+                if (cell.hides && result.sights.size() > count) {
                     result.gaps.push_back(static_cast<std::uint32_t>(count));
                 }
                 put(2 * i + 1, inSight ? b.coarse : 0.0);
@@ -505,7 +515,7 @@ ViewScorer::Seen ViewScorer::sightsAtMost(const Pose& world_T_camera) const {
     const Eigen::Vector3f eye = world_T_camera.translation.cast<float>();
     for (std::size_t i = 0; i < frontier_.size(); ++i) {
         const Eigen::Vector3f p = rotation * frontier_[i].centre + translation;
-        if (!visible(buffer, p, 0.6F * voxel)) {
+        if (!buffer.visible(p, 0.6F * voxel)) {
             continue;
         }
         const Eigen::Vector3f ray = (eye - frontier_[i].centre).normalized();

@@ -30,8 +30,8 @@ std::optional<double> insideRoom(const Eigen::Vector3d& origin, const Eigen::Vec
 
 /// Half of the room is seen, so that the camera may move about and there is much left to see.
 struct HalfSeenRoom {
-    explicit HalfSeenRoom(std::uint32_t seed)
-        : graph(graphOptions()), knowledge(graph, limits(), plannerOptions(seed)) {
+    explicit HalfSeenRoom(std::uint32_t seed, double heights = 2 * kHalf.z())
+        : graph(graphOptions()), knowledge(graph, limits(heights), plannerOptions(seed)) {
         for (int i = 0; i < 5; ++i) {
             const double a = 0.6 * i;
             const Eigen::Vector3d eye(-1.0 + 0.1 * i, -0.5, 0);
@@ -48,10 +48,12 @@ struct HalfSeenRoom {
         o.targetResolution = 0.05;
         return o;
     }
-    static PlatformLimits limits() {
+    static PlatformLimits limits(double heights) {
         PlatformLimits limits;
         limits.boxMin = -kHalf;
         limits.boxMax = kHalf;
+        limits.boxMin.z() = -0.5 * heights;
+        limits.boxMax.z() = 0.5 * heights;
         limits.clearance = 0.2;
         limits.farLimit = 6;
         limits.minTilt = -0.7;
@@ -125,7 +127,7 @@ TEST(Climb, findsMoreThanAsManyViewsByLot) {
     }
     const double ratio = std::exp(logRatios / kSeeds);
     RecordProperty("ratio", std::to_string(ratio));
-    EXPECT_GT(ratio, 1.08) << "utility of the best view, geometric mean over the seeds";
+    EXPECT_GT(ratio, 1.15) << "utility of the best view, geometric mean over the seeds";
 }
 
 /// The same from the definition: 6 voxels of 8 cm, a cosine of 0.8.
@@ -159,6 +161,28 @@ std::vector<std::size_t> apart(const std::vector<Candidate>& all, std::size_t mo
     return apart;
 }
 
+/// On wheels the camera's box is a few voxels high; changes that lead out of it are not lost.
+TEST(Climb, movesAboutInAFlatBox) {
+    const auto movesAt = [](double heights) {
+        std::size_t count = 0;
+        for (std::uint32_t seed = 1; seed <= 4; ++seed) {
+            HalfSeenRoom room(seed, heights);
+            Choice choice(room.knowledge, room.pool, room.memory);
+            addFirst(choice);
+            const std::vector<Candidate>& all = ChoiceTwin::candidates(choice);
+            const std::size_t first = all.size();
+            ChoiceTwin::climb(choice);
+            count += static_cast<std::size_t>(
+                std::count_if(all.begin() + static_cast<std::ptrdiff_t>(first), all.end(),
+                              [](const Candidate& c) { return c.path > 0; }));
+        }
+        return count;
+    };
+    const std::size_t anywhere = movesAt(2 * kHalf.z());
+    ASSERT_GT(anywhere, 300U);
+    EXPECT_GT(static_cast<double>(movesAt(0.24)), 0.9 * static_cast<double>(anywhere));
+}
+
 TEST(Climb, startsFromWhatThereIs) {
     HalfSeenRoom room(1);
     Choice choice(room.knowledge, room.pool, room.memory);
@@ -176,7 +200,7 @@ TEST(Climb, startsFromWhatThereIs) {
                          [&](const Candidate& c) { return c.utility == before; })};
     ChoiceTwin::climb(choice);
     EXPECT_GT(all.size(), 50U);
-    EXPECT_LE(all.size(), 1U + 8 * 2 * 12);
+    EXPECT_LE(all.size(), 1U + 8 * 2 * 10);
     EXPECT_GT(HalfSeenRoom::best(choice), before);
 }
 

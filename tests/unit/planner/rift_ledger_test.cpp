@@ -92,6 +92,27 @@ TEST_F(LedgerOnWall, whatIsCountedAlongTheWayIsWhatIsThere) {
     }
 }
 
+TEST_F(LedgerOnWall, whatIsInfinitelyFarIsInNoBlock) {
+    // Aslant, so that it is infinitely far along each axis, downwards too.
+    View view = test::viewOf(lookAt({0, 0, 0}, {-1, -0.7, -0.4}),
+                             [](const Eigen::Vector3d&, const Eigen::Vector3d& ray) {
+                                 return std::optional(-1.0 / ray.x());  // the wall x = -1
+                             });
+    for (int row = 0; row < view.disparity.height; ++row) {
+        for (int column = 0; column < view.disparity.width; ++column) {
+            if ((row + column) % 20 < 10) {
+                view.disparity.disparity[view.disparity.index(column, row)] = 0;
+            }
+        }
+    }
+    ASSERT_TRUE(view.disparity.valid(0, 0));
+    ASSERT_TRUE(std::isinf(view.camera.depth(0.0)));
+    graph.merge(view);
+    summary.update(graph, view);
+    EXPECT_GT(summary.changed().size(), 0U);
+    EXPECT_LT(summary.changed().size(), 50U);
+}
+
 TEST_F(LedgerOnWall, aTearThatIsClosedIsResolved) {
     see(lookAt({0, 1, 0}, {1, 1, 0}));  // a metre to the left: its left rim is inside now
     std::size_t resolved = 0;
@@ -377,6 +398,38 @@ TEST_F(BenefitOfATear, liesWhereTheHiddenSurfaceFaces) {
     EXPECT_GT(area({-1, 0, 1}), 0.004);
     record.cell.hiddenNormal = {0, 0, 0.1F};  // two rims that face each other
     EXPECT_GT(area({-1, 0, 0}), 0.004);
+}
+
+TEST_F(BenefitOfATear, isASharePerVainTryAndNothingFromWhereItWasTried) {
+    record.cell.hiddenNormal = {-1, 0, 0};
+    weights.vain = 0.5;
+    weights.vainUnmatched = 0.75;
+    const double untried = area({-1, 0, 0});
+    ASSERT_GT(untried, 0.004);
+    record.attempts.push_back({{0, 0, 1}, 1.0F});
+    EXPECT_NEAR(area({-1, 0, 0}), 0.75 * untried, 1e-9);
+    record.attempts.push_back({{0, 1, 0}, 1.0F});
+    EXPECT_NEAR(area({-1, 0, 0}), 0.75 * 0.75 * untried, 1e-9);
+    record.cell.kinds = kImageBorder;
+    EXPECT_NEAR(area({-1, 0, 0}), 0.5 * 0.5 * untried, 1e-9);
+    record.attempts.push_back({{-1, 0, 0}, 1.0F});
+    EXPECT_EQ(area({-1, 0, 0}), 0.0);
+}
+
+TEST_F(BenefitOfATear, liesOverTheRimAtASilhouette) {
+    record.cell.hidden = 0;
+    record.cell.rim = 10;
+    const Eigen::Vector3d over(0, 0, 1);
+    EXPECT_EQ(area(over), 0.0) << "in the plane of the surface";
+    record.cell.kinds = kDepthStep;
+    const double first = area(over);
+    EXPECT_GT(first, 0.0);
+    weights.vain = 1;
+    record.attempts.push_back({{-1, 0, 0}, 1.0F});
+    const Eigen::Vector3d behind(0.5, 0, 1);
+    const double second = area(behind);
+    record.attempts.clear();
+    EXPECT_GT(second, area(behind)) << "the more so after a vain view from before it";
 }
 
 TEST_F(BenefitOfATear, isNothingWhereAFoldIsInTheWay) {

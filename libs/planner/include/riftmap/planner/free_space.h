@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "riftmap/core/view.h"
+#include "riftmap/core/whole.h"
 #include "riftmap/planner/sensor_model.h"
 
 namespace riftmap {
@@ -167,7 +168,9 @@ class FreeSpace {
                static_cast<std::size_t>(v.x());
     }
     Eigen::Vector3i coordinates(std::size_t index) const;
-    Eigen::Vector3i voxelOf(const Eigen::Vector3d& point) const;
+    Eigen::Vector3i voxelOf(const Eigen::Vector3d& point) const {
+        return wholesBelow((point - origin_) / voxel_);
+    }
     Eigen::Vector3d centre(const Eigen::Vector3i& v) const {
         return origin_ + (v.cast<double>() + Eigen::Vector3d::Constant(0.5)) * voxel_;
     }

@@ -36,8 +36,8 @@ struct PlannerOptions {
                                     ///< far as it is within the resolution of where it should be
     double clearanceMargin = 0.02;  ///< beyond the platform's clearance [m]
     int targets = 48;               ///< tears that candidates are made for, in one plan
-    int places = 32;                ///< places for candidates that aim at no tear, in one plan
-    int candidates = 160;           ///< views of tears that are scored, in one plan
+    int places = 24;                ///< places for candidates that aim at no tear, in one plan
+    int candidates = 100;           ///< views of tears that are scored, in one plan
     /// Surfaces lie in this box, the space around it is free: xmin ymin zmin xmax ymax zmax [m].
     /// Empty: nothing is known beforehand.
     std::vector<double> surfaceBox;

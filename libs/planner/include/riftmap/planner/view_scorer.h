@@ -128,16 +128,24 @@ class ViewScorer {
  private:
     static constexpr std::size_t kMostOpen = 6000;  ///< open cells that an estimate weighs
 
-    Benefit benefit(const RiftRecord& record, double vain, const Pose& world_T_camera,
-                    bool withLines) const;
-    ViewScore scoreEvery(std::size_t stride, int rayStride, const Drawing& drawing) const;
-
     /// What every candidate asks of an open cell, side by side: records lie anywhere in memory.
+    /// Of the records as they were when the scorer was made; only tries and updates change it.
     struct OpenCell {
+        const RiftRecord* record = nullptr;
         Eigen::Vector3f open;    ///< its openPosition
         Eigen::Vector3f wanted;  ///< what is to be seen: the place of its gap, if it has one
-        double vain = 0;         ///< leftAfterTries(), which tries alone change
+        bool hides = false;      ///< it has one
+        bool tried = false;      ///< views of it were in vain
+        double vain = 0;         ///< leftAfterTries()
+        double torn = 0;         ///< what seeing its tear is worth [m^2]
+        double coarse = 0;       ///< what seeing its coarse part well is worth [m^2]
+        /// Where it is to be seen from, and what it hides; unit, or zero for any side.
+        Eigen::Vector3d facing, hiddenFacing;
     };
+    OpenCell openCellOf(const RiftRecord& record) const;
+    Benefit benefit(const OpenCell& cell, const Pose& world_T_camera, bool withLines) const;
+    ViewScore scoreEvery(std::size_t stride, int rayStride, const Drawing& drawing) const;
+
     struct BlockView {
         Eigen::Vector3f centre;
         float radius;
@@ -156,9 +164,7 @@ class ViewScorer {
     double newSurfaceShare(double distance) const;
     double besideRim(const SurfaceCell& cell) const;
     double nearShareOf(const DepthBuffer& buffer) const;
-    std::optional<float> drawnAt(const DepthBuffer& buffer, const Eigen::Vector3f& inCamera) const;
-    bool visible(const DepthBuffer& buffer, const Eigen::Vector3f& inCamera, float slack) const;
-    bool openTo(const SurfaceCell& cell, const Pose& world_T_camera) const;
+    bool openTo(const OpenCell& cell, const Pose& world_T_camera) const;
     template <class F>
     void forEachUnknown(const Pose& world_T_camera, const DepthBuffer& buffer, int stride,
                         const F& f) const;
