@@ -12,9 +12,11 @@ FreeSpace::UnknownRun FreeSpace::firstUnknown(const Eigen::Vector3d& origin,
                                               const Eigen::Vector3d& direction,
                                               double length) const {
     const double step = 0.9 * voxel_;
+    const Eigen::Vector3d start = (origin - origin_) / voxel_;
+    const Eigen::Vector3d along = direction / voxel_;
     UnknownRun run;
     for (double s = step; s < length; s += step) {
-        const Eigen::Vector3i v = voxelOf(origin + s * direction);
+        const Eigen::Vector3i v = wholesBelow(start + s * along);
         if (!inside(v)) {
             break;
         }

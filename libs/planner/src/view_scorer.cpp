@@ -51,8 +51,8 @@ struct ViewScorer::DepthBuffer {
             return std::nullopt;
         }
         // What is left over of an image of no whole number of them belongs to the last.
-        return at(std::min(static_cast<int>(u + 0.5F), width - 1),
-                  std::min(static_cast<int>(v + 0.5F), height - 1));
+        return at(std::min(wholeBelow(u + 0.5F), width - 1),
+                  std::min(wholeBelow(v + 0.5F), height - 1));
     }
     /// In the image, and nothing drawn more than `slack` before it.
     bool visible(const Eigen::Vector3f& inCamera, float slack) const {
