@@ -31,7 +31,7 @@ std::optional<double> insideRoom(const Eigen::Vector3d& origin, const Eigen::Vec
 /// Half of the room is seen, so that the camera may move about and there is much left to see.
 struct HalfSeenRoom {
     explicit HalfSeenRoom(std::uint32_t seed, double heights = 2 * kHalf.z())
-        : graph(graphOptions()), knowledge(graph, limits(heights), plannerOptions(seed)) {
+        : graph(test::graphOptions(0.05)), knowledge(graph, limits(heights), plannerOptions(seed)) {
         for (int i = 0; i < 5; ++i) {
             const double a = 0.6 * i;
             const Eigen::Vector3d eye(-1.0 + 0.1 * i, -0.5, 0);
@@ -42,11 +42,6 @@ struct HalfSeenRoom {
             knowledge.update(view);
         }
         knowledge.updateReach();
-    }
-    static GraphOptions graphOptions() {
-        GraphOptions o;
-        o.targetResolution = 0.05;
-        return o;
     }
     static PlatformLimits limits(double heights) {
         PlatformLimits limits;

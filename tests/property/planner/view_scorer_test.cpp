@@ -18,7 +18,7 @@ namespace {
 struct Watched {
     Watched(std::uint32_t seed, double cell, double resolution_, bool withGaps = false)
         : scene(seed),
-          graph(optionsFor(resolution_)),
+          graph(test::graphOptions(resolution_)),
           summary(cell, resolution_),
           ledger(resolution_, 3),
           space(Eigen::AlignedBox3d(Eigen::Vector3d(-1, -4, -4), Eigen::Vector3d(3, 4, 4)), 0.1),
@@ -49,12 +49,6 @@ struct Watched {
         return lookAt(scene.place({-0.5, -1.2, -1}, {1.4, 1.2, 1}),
                       scene.place({1.5, -1, -1}, {3, 1, 1}));
     }
-    static GraphOptions optionsFor(double target) {
-        GraphOptions options;
-        options.targetResolution = target;
-        return options;
-    }
-
     test::RandomScene scene;
     PixelGraph graph;
     SeenThrough seen;

@@ -44,11 +44,6 @@ class Slit : public testing::Test {
         const double back = *test::wall(2.0)(origin, ray);
         return height(back) > half ? side : *test::wall(4.0)(origin, ray);
     }
-    static GraphOptions graphOptions() {
-        GraphOptions o;
-        o.targetResolution = 0.05;
-        return o;
-    }
     static PlatformLimits limits() {
         PlatformLimits limits;
         limits.boxMin = Eigen::Vector3d(-2, -2, -2);
@@ -63,7 +58,7 @@ class Slit : public testing::Test {
         return o;
     }
 
-    PixelGraph graph{graphOptions()};
+    PixelGraph graph{test::graphOptions(0.05)};
     Knowledge knowledge{graph, limits(), options()};
     const Eigen::Vector3d behind{2.8, 0, 0};
 };

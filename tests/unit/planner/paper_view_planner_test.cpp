@@ -18,11 +18,6 @@ class PaperBeforeWall : public testing::Test {
         knowledge.update(view);
         knowledge.updateReach();
     }
-    static GraphOptions options() {
-        GraphOptions o;
-        o.targetResolution = 0.05;
-        return o;
-    }
     static PlatformLimits limits() {
         PlatformLimits limits;
         limits.boxMin = Eigen::Vector3d(-1, -2, -2);
@@ -32,7 +27,7 @@ class PaperBeforeWall : public testing::Test {
         return limits;
     }
 
-    PixelGraph graph{options()};
+    PixelGraph graph{test::graphOptions(0.05)};
     Knowledge knowledge{graph, limits(), {}};
     PaperViewPlanner planner{PaperPlannerOptions{}};
 };

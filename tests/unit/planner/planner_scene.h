@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "riftmap/core/view.h"
+#include "riftmap/graph/pixel_graph.h"
 
 namespace riftmap::test {
 
@@ -56,6 +57,13 @@ inline std::function<std::optional<double>(const Eigen::Vector3d&, const Eigen::
         }
         return (at - origin.x()) / direction.x();
     };
+}
+
+/// Of a map that is asked for so finely [m]; the rest as it comes.
+inline GraphOptions graphOptions(double targetResolution) {
+    GraphOptions options;
+    options.targetResolution = targetResolution;
+    return options;
 }
 
 /// The inside of a box around the origin, from a place in it; half its edges.

@@ -34,12 +34,7 @@ class LedgerOnWall : public testing::Test {
         return 0;
     }
 
-    static GraphOptions options() {
-        GraphOptions o;
-        o.targetResolution = 0.05;
-        return o;
-    }
-    PixelGraph graph{options()};
+    PixelGraph graph{test::graphOptions(0.05)};
     SurfaceSummary summary{0.2, 0.05};
     RiftLedger ledger{0.05, 3};
 };
@@ -162,7 +157,7 @@ TEST_F(LedgerOnWall, triesInVainMakeOtherTearsWithoutAMatchWorthLess) {
             }
         }
     }
-    PixelGraph map(options());
+    PixelGraph map(test::graphOptions(0.05));
     SurfaceSummary cells(0.1, 0.05);
     RiftLedger tears(0.05, 100);
     map.merge(view);

@@ -21,12 +21,6 @@ std::optional<double> insideRoom(const Eigen::Vector3d& origin, const Eigen::Vec
     return test::insideBox(kHalf, origin, ray);
 }
 
-GraphOptions graphOptions() {
-    GraphOptions o;
-    o.targetResolution = 0.05;
-    return o;
-}
-
 PlatformLimits limits() {
     PlatformLimits limits;
     limits.boxMin = -kHalf;
@@ -38,7 +32,7 @@ PlatformLimits limits() {
 
 /// Views until the camera can reach more than its own place; the last of 12 if it cannot.
 int viewsToGetOut(unsigned seed, int firstColumn) {
-    PixelGraph graph(graphOptions());
+    PixelGraph graph(test::graphOptions(0.05));
     PlannerOptions options;
     options.voxelSize = 0.08;
     options.seed = seed;
@@ -79,7 +73,7 @@ TEST(WayOut, takesFewViewsThoughThePyramidIsNarrowerThanTheCamera) {
 }
 
 TEST(WayOut, isNotLookedForInsideOfAnObjectsBox) {
-    PixelGraph graph(graphOptions());
+    PixelGraph graph(test::graphOptions(0.05));
     PlannerOptions options;
     options.surfaceBox = {-3, -3, -2, 3, 3, 2};
     Knowledge knowledge(graph, limits(), options);
