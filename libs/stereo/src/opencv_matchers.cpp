@@ -46,8 +46,10 @@ void computeWith(cv::StereoMatcher& matcher, const StereoOptions& options, int w
     out.minDisparity = static_cast<float>(options.minDisparity);
     out.maxDisparity = static_cast<float>(options.minDisparity + options.numDisparities - 1);
     out.firstColumn = std::clamp(options.minDisparity + options.numDisparities - 1, 0, out.width);
-    // cv::StereoBM wants an image wider than its window and range; nothing could be matched there.
-    if (out.width <= out.firstColumn || std::min(out.width, out.height) <= window) {
+    // OpenCV matches no column nearer to the left than its own range, and cv::StereoSGBM's
+    // three-way mode writes where there is no memory if there are no others.
+    if (out.width <= options.minDisparity + matcher.getNumDisparities() ||
+        std::min(out.width, out.height) <= window) {
         return;
     }
     matcher.compute(grey.left, grey.right, raw);

@@ -104,6 +104,28 @@ TEST_P(EveryMatcher, RefusesWhatIsNoPair) {
                 HasSubstr("allowed: 8 or 16 bit"));
 }
 
+TEST_P(EveryMatcher, TakesImagesAboutAsWideAsItsRange) {
+    cv::Mat noise(12, 120, CV_8UC1);
+    cv::RNG(5).fill(noise, cv::RNG::UNIFORM, 0, 256);
+    for (const int range : {3, 16, 18, 96}) {
+        StereoOptions options;
+        options.matcher = GetParam();
+        options.numDisparities = range;
+        const auto matcher = makeStereoMatcher(options);
+        for (int width = 1; width <= range + 20; ++width) {
+            const cv::Mat image = noise.colRange(0, width);
+            DisparityImage out;
+            matcher->compute(image, image, out);
+            ASSERT_EQ(out.width, width);
+            for (int r = 0; r < out.height; ++r) {
+                for (int c = 0; c < std::min(width, range - 1); ++c) {
+                    EXPECT_FALSE(out.valid(c, r)) << width << " x 12, range " << range;
+                }
+            }
+        }
+    }
+}
+
 INSTANTIATE_TEST_SUITE_P(Stereo, EveryMatcher,
                          ::testing::Values(MatcherKind::kPaper, MatcherKind::kOpenCvBlock,
                                            MatcherKind::kOpenCvSgbm));
