@@ -276,7 +276,8 @@ void EvalProgram::run() {
     eval_.resolveCache();
     const CoverageJudge judge(
         platform.world().mesh, platform.rayCaster(),
-        viewSpaceOf(platform.limits(), platform.camera(), platform.pose().translation), eval_);
+        viewSpaceOf(platform.limits(), platform.camera(), platform.pose().translation), eval_,
+        progressOf("what can be seen:", "looks"));
     meshArea = judge.meshArea();
     mapArea = map.area;
     report =

@@ -12,6 +12,7 @@
 #include "riftmap/apps/explore_report.h"
 #include "riftmap/apps/pictures.h"
 #include "riftmap/core/file.h"
+#include "riftmap/core/progress.h"
 #include "riftmap/eval/map_surface.h"
 #include "riftmap/planner/paper_view_planner.h"
 
@@ -123,7 +124,8 @@ ExploreRun::ExploreRun(ExploreProgram& program, RunDirectory& directory, bool re
     gains_ = std::make_unique<CsvWriter>(
         directory.file("gains.csv"),
         std::vector<std::string>{"view", "expected_tears_m2", "expected_finer_m2",
-                                 "expected_unknown_m2", "new_m2", "well_known_m2"});
+                                 "expected_unknown_m2", "new_m2", "well_known_m2",
+                                 "expected_views_left", "expected_share"});
     if (program.explore_.rawlog) {
         rawlog_ = std::make_unique<RawlogWriter>(
             directory.file("run.rawlog"), RawlogWriter::Images::kExternal,
@@ -147,7 +149,8 @@ void ExploreRun::makeJudge() {
     const ViewSpace space =
         viewSpaceOf(platform_->limits(), platform_->camera(), platform_->pose().translation);
     judge_ = std::make_unique<CoverageJudge>(platform_->world().mesh, platform_->rayCaster(), space,
-                                             program_.eval_);
+                                             program_.eval_,
+                                             program_.progressOf("what can be seen:", "looks"));
     tracker_ = std::make_unique<CoverageTracker>(*judge_);
 }
 
@@ -274,9 +277,12 @@ void ExploreRun::onStep(const ExploreStep& measured, const Knowledge& knowledge)
         figures.coverage = coverageAfter(step);
         row.coverage = figures.coverage[headlineIndex()].cObs;
     }
-    gains_->row({step.view, step.gain - step.coarseGain - step.unknownGain, step.coarseGain,
-                 step.unknownGain, step.newArea, step.wellKnownArea});
     history_.push_back(std::move(figures));
+    const auto ahead = forecastNow(knowledge.minGain());
+    constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+    gains_->row({step.view, step.gain - step.coarseGain - step.unknownGain, step.coarseGain,
+                 step.unknownGain, step.newArea, step.wellKnownArea,
+                 ahead ? ahead->viewsLeft : kNone, ahead ? ahead->share : kNone});
     if (known) {
         recorder_->stepAgain(row);
     } else {
@@ -284,7 +290,7 @@ void ExploreRun::onStep(const ExploreStep& measured, const Knowledge& knowledge)
     }
     writePictureOfView(history_.size());
     if (program_.progress()) {
-        showProgress(step, knowledge);
+        showProgress(row, step, ahead);
     }
 }
 
@@ -299,20 +305,45 @@ void ExploreRun::writePictureOfView(std::size_t number) {
     }
 }
 
-void ExploreRun::showProgress(const ExploreStep& step, const Knowledge& knowledge) const {
-    const auto n = knowledge.ledger().counts();
+std::optional<Forecast> ExploreRun::forecastNow(double leastGain) const {
+    std::vector<double> expected, seen;
+    for (const StepFigures& f : history_) {
+        expected.push_back(f.step.gain);
+        seen.push_back(f.step.newArea);
+    }
+    return forecast(expected, seen, leastGain);
+}
+
+void ExploreRun::showProgress(const StepRow& row, const ExploreStep& step,
+                              const std::optional<Forecast>& ahead) const {
     std::ostringstream line;
     line.setf(std::ios::fixed);
     line.precision(1);
     line << "view " << step.view + 1 << ", " << step.pathLength << " m, " << graph().vertexCount()
-         << " vertices, cells: " << n[0] << " open " << n[2] << " unreachable " << n[3]
-         << " unobservable, gain ";
+         << " vertices, rifts:";
+    for (std::size_t i = 0; i < kRiftStates; ++i) {
+        if (static_cast<RiftState>(i) != RiftState::kResolved && (i == 0 || row.rifts[i] > 0)) {
+            line << ' ' << row.rifts[i] << ' ' << kRiftStateNames[i];
+        }
+    }
     line.precision(3);
-    line << step.gain << " m2, plan " << std::lround(step.planMs) << " merge "
+    line << ", gain " << step.gain << " m2, plan " << std::lround(step.planMs) << " merge "
          << std::lround(step.mergeMs) << " ms";
     line.precision(2);
     for (const Coverage& c : history_.back().coverage) {
         line << ", " << 100 * c.cObs << " % at " << deltaName(c.delta);
+    }
+    if (ahead) {
+        const auto taken = static_cast<double>(history_.size());
+        const double left = std::min(ahead->viewsLeft, program_.stop_.maxViews - taken);
+        const std::size_t recent = history_.size() / 2;
+        const double seconds = (step.seconds - history_[recent].step.seconds) /
+                               static_cast<double>(history_.size() - 1 - recent);
+        const long views = std::lround(std::ceil(left));
+        line.precision(1);
+        line << "; about " << 100 * ahead->share << " % of what it will see, " << views
+             << (views == 1 ? " view and " : " views and ") << durationText(left * seconds)
+             << " left";
     }
     std::cerr << line.str() << '\n';
 }

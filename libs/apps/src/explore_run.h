@@ -17,6 +17,7 @@
 #include "riftmap/eval/baselines.h"
 #include "riftmap/eval/coverage_tracker.h"
 #include "riftmap/maps/pixel_graph_map.h"
+#include "riftmap/planner/forecast.h"
 #include "riftmap/stereo/view_builder.h"
 
 namespace riftmap {
@@ -46,7 +47,9 @@ class ExploreRun {
     std::vector<RiftRow> certificate() const;
     void writeCells() const;
     YamlMap figures(const std::string& error);
-    void showProgress(const ExploreStep& step, const Knowledge& knowledge) const;
+    std::optional<Forecast> forecastNow(double leastGain) const;
+    void showProgress(const StepRow& row, const ExploreStep& step,
+                      const std::optional<Forecast>& ahead) const;
     void takeOver();
     void finish(const std::string& error);
     void writeReport() const;

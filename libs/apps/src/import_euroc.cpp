@@ -138,8 +138,7 @@ mrpt::obs::CObservationStereoImages rawPair(const RawCamera& left, const RawCame
 
 }  // namespace
 
-ImportReport importEuroc(const fs::path& folder, RawlogWriter& writer,
-                         const ImportProgress& progress) {
+ImportReport importEuroc(const fs::path& folder, RawlogWriter& writer, const OnProgress& progress) {
     // With a trailing slash the parent would be the folder itself.
     const auto given = (folder / ".").lexically_normal().parent_path();
     const auto mav = fs::is_directory(given / "mav0") ? given / "mav0" : given;

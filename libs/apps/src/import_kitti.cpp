@@ -137,7 +137,7 @@ void KittiOptions::describe(OptionTable& table) {
 }
 
 ImportReport importKitti(const fs::path& folder, const KittiOptions& options, RawlogWriter& writer,
-                         const ImportProgress& progress) {
+                         const OnProgress& progress) {
     if (!fs::is_directory(folder)) {
         throw FileError(folder.string() + ": no such folder");
     }

@@ -2,9 +2,6 @@
 #include "riftmap/apps/import_program.h"
 
 #include <cstdio>
-#include <optional>
-
-#include "riftmap/core/progress.h"
 
 namespace riftmap {
 
@@ -47,13 +44,7 @@ void ImportProgram::run() {
     if (format == "pair") {
         report = importPair(given[1], given[2], pair_, writer);
     } else {
-        std::optional<Progress> bar;
-        const auto show = [&](std::size_t done, std::size_t all) {
-            if (!bar) {
-                bar.emplace("importing", "pairs", all, progress());
-            }
-            bar->update(done);
-        };
+        const auto show = progressOf("importing", "pairs");
         report = format == "kitti" ? importKitti(given[1], kitti_, writer, show)
                                    : importEuroc(given[1], writer, show);
     }

@@ -7,6 +7,7 @@
 
 #include <cstdio>
 #include <exception>
+#include <optional>
 #include <utility>
 
 #include "all_programs.h"
@@ -214,6 +215,17 @@ void Program::checkMayWrite(const std::filesystem::path& file) const {
 
 int Program::threads() const {
     return threads_ > 0 ? threads_ : tbb::info::default_concurrency();
+}
+
+OnProgress Program::progressOf(const std::string& what, const std::string& unit) const {
+    // Shared, for a function is copied.
+    const auto bar = std::make_shared<std::optional<Progress>>();
+    return [=, enabled = progress()](std::size_t done, std::size_t all) {
+        if (!*bar) {
+            bar->emplace(what, unit, all, enabled);
+        }
+        (*bar)->update(done);
+    };
 }
 
 std::string Program::usageText() const {

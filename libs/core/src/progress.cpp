@@ -15,7 +15,15 @@ namespace {
 constexpr auto kRefresh = std::chrono::milliseconds(200);
 constexpr std::size_t kStepsWithoutTotal = 100;  ///< a line for so many where no share is known
 
-std::string duration(double seconds) {
+std::string threeDigits(double value) {
+    char buffer[32];
+    std::snprintf(buffer, sizeof(buffer), "%.3g", value);
+    return buffer;
+}
+
+}  // namespace
+
+std::string durationText(double seconds) {
     const auto s = static_cast<long>(std::ceil(seconds));
     if (s < 60) {
         return std::to_string(s) + " s";
@@ -25,14 +33,6 @@ std::string duration(double seconds) {
     }
     return std::to_string(s / 3600) + " h " + std::to_string(s / 60 % 60) + " min";
 }
-
-std::string threeDigits(double value) {
-    char buffer[32];
-    std::snprintf(buffer, sizeof(buffer), "%.3g", value);
-    return buffer;
-}
-
-}  // namespace
 
 Progress::Progress(std::string what, std::string unit, std::size_t total, bool enabled)
     : what_(std::move(what)),
@@ -98,9 +98,9 @@ std::string Progress::line(std::size_t done, double elapsedSeconds) const {
         const double rate = static_cast<double>(done) / elapsedSeconds;
         text += ", " + threeDigits(rate) + " " + unit_ + "/s";
         if (total_ > done) {
-            text += ", " + duration(static_cast<double>(total_ - done) / rate) + " left";
+            text += ", " + durationText(static_cast<double>(total_ - done) / rate) + " left";
         } else {
-            text += ", took " + duration(elapsedSeconds);
+            text += ", took " + durationText(elapsedSeconds);
         }
     }
     return text;

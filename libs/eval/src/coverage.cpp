@@ -60,11 +60,12 @@ const DistanceFigures& CoverageReport::atDelta(double delta) const {
 }
 
 CoverageJudge::CoverageJudge(const TriangleMesh& mesh, const RayCaster& caster,
-                             const ViewSpace& space, const EvalOptions& options)
+                             const ViewSpace& space, const EvalOptions& options,
+                             const OnProgress& progress)
     : options_(options),
       caster_(&caster),
       samples_(groundTruthSamples(mesh, options)),
-      observable_(observableSet(caster, space, samples_, options)),
+      observable_(observableSet(caster, space, samples_, options, progress)),
       deltas_(options.deltas),
       headline_(options.headline),
       meshArea_(area(mesh)) {

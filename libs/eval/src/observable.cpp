@@ -321,7 +321,8 @@ ViewSpace viewSpaceOf(const PlatformLimits& limits, const StereoCamera& camera,
 }
 
 ObservableSet observableSet(const RayCaster& caster, const ViewSpace& space,
-                            const SurfaceSamples& samples, const EvalOptions& options) {
+                            const SurfaceSamples& samples, const EvalOptions& options,
+                            const OnProgress& progress) {
     ObservableSet out;
     const ReachableSpace reachable(caster, space, options.grid);
     out.key = keyOf(samples, space, reachable, options);
@@ -334,15 +335,26 @@ ObservableSet observableSet(const RayCaster& caster, const ViewSpace& space,
         const SightFinder finder(caster, space, reachable, samples, options.maxIncidence);
         std::vector<Sight> sights(count);
         const Spreading spreading(finder, samples);
-        for (const Round& round : roundsOf(options.directions, spacingOf(samples))) {
+        const auto rounds = roundsOf(options.directions, spacingOf(samples));
+        constexpr std::size_t kAtOnce = 4096;
+        std::size_t done = 0;
+        for (const Round& round : rounds) {
             const std::vector<Sight> before = sights;
             const std::vector<Eigen::Vector2d> circle = SightFinder::goldenCircle(round.directions);
-            parallelForEach(count, 64, [&](std::size_t i) {
-                if (before[i].side == 0 &&
-                    (!round.onlyBesideSeen || spreading.besideSeen(i, before))) {
-                    sights[i] = finder.lookOut(i, circle);
+            for (std::size_t begin = 0; begin < count; begin += kAtOnce) {
+                const std::size_t some = std::min(kAtOnce, count - begin);
+                parallelForEach(some, 64, [&](std::size_t k) {
+                    const std::size_t i = begin + k;
+                    if (before[i].side == 0 &&
+                        (!round.onlyBesideSeen || spreading.besideSeen(i, before))) {
+                        sights[i] = finder.lookOut(i, circle);
+                    }
+                });
+                done += some;
+                if (progress) {
+                    progress(done, rounds.size() * count);
                 }
-            });
+            }
             spreading.run(sights);
         }
         sides.resize(count);

@@ -119,10 +119,12 @@ void PlannerOptions::describe(OptionTable& table) {
     table.add("voxel_size", voxelSize, 0, 10, "m",
               "Edge of the voxels of the known free space; 0 = by the size of the workspace");
     table.add("view_cost", viewCost, 0.01, 100, "m", "Cost of taking a view, as length of path");
-    table.add("min_gain", minGain, 0, 1, "",
-              "A view that promises less than this share of the surface known is not worth taking; "
-              "0 = 0.0004, with exact depth 0.0001, with noisy depth that is not matched 0.0007; "
-              "around an object (surface_box) 0.0003, 0.0004 and 0.00048");
+    table.add(
+        "min_gain", minGain, 0, 1, "",
+        "A view that promises less than this share of the surface known is not worth taking; "
+        "0 = 0.0004, with exact depth 0.0001, with noisy depth that is not matched 0.0007; "
+        "around an object (surface_box) 0.0003, 0.0004 and 0.00048; with 0 of no more surface "
+        "than fills ten images at the far limit (400 m^2 at 6 m)");
     table.add("max_attempts", maxAttempts, 1, 100, "",
               "Different views of a tear that may fail before it is given up");
     table.add("unknown_weight", unknownWeight, 0, 100, "",
@@ -305,8 +307,12 @@ double Knowledge::minGain() const {
     const Shares& shares = sensor_.exactDepth() ? kExact
                            : sensor_.matched()  ? kMatched
                                                 : kPixelwise;
-    const double automatic = surfaceBox() ? shares.aroundObject : shares.inRooms;
-    return (options_.minGain > 0 ? options_.minGain : automatic) * summary_.area();
+    if (options_.minGain > 0) {
+        return options_.minGain * summary_.area();
+    }
+    // A share of all would leave ever larger holes in ever larger buildings.
+    const double most = 10 * sensor_.areaSeenAt(sensor_.farLimit);
+    return (surfaceBox() ? shares.aroundObject : shares.inRooms) * std::min(summary_.area(), most);
 }
 
 bool Knowledge::mayBeAt(const Eigen::Vector3d& place) const {

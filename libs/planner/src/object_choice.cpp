@@ -148,6 +148,16 @@ void Choice::keepBestAround() {
     }
 }
 
+/// The one candidate that is left becomes a better one, by changes that get smaller. Four rounds of
+/// 12 do better than two of 24 of one size: around the dragon half a view less.
+void Choice::climbAround() {
+    constexpr int kChanges = 12;
+    for (const double scale : {2.0, 1.26, 0.79, 0.5}) {
+        vary(Candidate(candidates_.front()), kChanges, scale);
+        keepBestAround();
+    }
+}
+
 /// Places of the frontier that a view looks at.
 std::vector<Eigen::Vector3d> Choice::frontierSeen(const Pose& pose) const {
     std::vector<Eigen::Vector3d> places;
@@ -209,10 +219,7 @@ std::optional<ViewPlan> Choice::makeAround(const Eigen::AlignedBox3d& box) {
         return lastResorts();
     }
     candidates_ = {Candidate(candidates_[tour.views.front()])};
-    for (int round = 0; round < 2; ++round) {
-        vary(Candidate(candidates_.front()), 24, 1.0);
-        keepBestAround();
-    }
+    climbAround();
     return planFor(candidates_.front());
 }
 

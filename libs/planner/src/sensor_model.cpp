@@ -41,6 +41,10 @@ SensorModel SensorModel::of(const View& view, const PlatformLimits& limits) {
     return model;
 }
 
+double SensorModel::areaSeenAt(double depth) const {
+    return (camera.width * depth / camera.fx) * (camera.height * depth / camera.fy);
+}
+
 double SensorModel::goodDepth(double resolution) const {
     double depth = std::min(farLimit, 0.8 * resolution * camera.fx);
     if (sigmaDisparity > 0) {

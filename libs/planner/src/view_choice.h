@@ -59,6 +59,7 @@ class Choice {
     void scoreFrom(std::size_t first);
     void preselect();
     void climb();
+    void climbAround();
     const Candidate* best() const;
     std::vector<Eigen::Vector3d> frontierSeen(const Pose& pose) const;
     std::optional<ViewPlan> planFor(const Candidate& candidate) const;

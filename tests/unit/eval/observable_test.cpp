@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -26,9 +27,10 @@ class RoomSpace : public ::testing::Test {
         space_.farLimit = 6;
         options_.samples = 6000;
     }
-    ObservableSet observe() const {
+    ObservableSet observe(const OnProgress& progress = {}) const {
         const RayCaster caster(mesh_);
-        return observableSet(caster, space_, groundTruthSamples(mesh_, options_), options_);
+        return observableSet(caster, space_, groundTruthSamples(mesh_, options_), options_,
+                             progress);
     }
 
     TriangleMesh mesh_ = shapes::box({0, 0, 0}, {4, 3, 2.5F}, true);
@@ -165,8 +167,18 @@ TEST_F(RoomSpace, SameSetForOneAndTwoThreads) {
 TEST_F(RoomSpace, TheCacheReturnsTheSameSetAndSurvivesDamage) {
     options_.cache = (std::filesystem::temp_directory_path() / "riftmap-observable-test").string();
     std::filesystem::remove_all(options_.cache);
-    const ObservableSet first = observe();
-    const ObservableSet second = observe();
+    std::vector<std::size_t> done;
+    const OnProgress progress = [&](std::size_t soFar, std::size_t all) {
+        EXPECT_EQ(all, 3 * 6000U) << "rounds of looks";
+        done.push_back(soFar);
+    };
+    const ObservableSet first = observe(progress);
+    ASSERT_GE(done.size(), 3U);
+    EXPECT_TRUE(std::is_sorted(done.begin(), done.end()));
+    EXPECT_EQ(done.back(), 3 * 6000U);
+    done.clear();
+    const ObservableSet second = observe(progress);
+    EXPECT_TRUE(done.empty()) << "what was found before takes no time";
     EXPECT_FALSE(first.fromCache);
     EXPECT_TRUE(second.fromCache);
     EXPECT_EQ(first.observable, second.observable);

@@ -156,6 +156,24 @@ TEST_F(Slit, theLeastGainFollowsTheDepthUnlessItIsGiven) {
     }
 }
 
+TEST_F(Slit, theLeastGainIsOfNoMoreThanTenImagesUnlessItIsGiven) {
+    PlatformLimits near = limits();
+    near.farLimit = 0.2;
+    const View view = test::viewOf(lookAt({0, 0, 0}, {1, 0, 0}), test::wall(1.2));
+    graph.merge(view);
+    Knowledge byDepth(graph, near, options());
+    byDepth.update(view);
+    const StereoCamera& c = view.camera;
+    const double images = 10 * 0.2 * 0.2 * c.width * c.height / (c.fx * c.fy);
+    ASSERT_GT(byDepth.summary().area(), 1.1 * images);
+    EXPECT_NEAR(byDepth.minGain(), 4e-4 * images, 1e-12);
+    PlannerOptions o = options();
+    o.minGain = 0.01;
+    Knowledge given(graph, near, o);
+    given.update(view);
+    EXPECT_NEAR(given.minGain(), 0.01 * given.summary().area(), 1e-12);
+}
+
 TEST_F(Slit, theCameraMayBeWhereNoWayLeads) {
     see(0.21);
     EXPECT_TRUE(knowledge.mayBeAt({1.6, 0, 0}));  // inside of it

@@ -5,17 +5,14 @@
 
 #include <cstddef>
 #include <filesystem>
-#include <functional>
 #include <string>
 
 #include "riftmap/apps/rawlog_writer.h"
 #include "riftmap/core/camera.h"
 #include "riftmap/core/options.h"
+#include "riftmap/core/progress.h"
 
 namespace riftmap {
-
-/// Called after each pair with how many of how many are done; may throw to stop.
-using ImportProgress = std::function<void(std::size_t, std::size_t)>;
 
 /// What an import brought over.
 struct ImportReport {
@@ -36,13 +33,13 @@ struct KittiOptions {
 /// calib_orig.txt (rows P0 P1 .. with or without their names), poses.txt, and times.txt if there.
 /// The robot is where the left camera is, x forward, z up; the map frame is its first pose.
 ImportReport importKitti(const std::filesystem::path& folder, const KittiOptions& options,
-                         RawlogWriter& writer, const ImportProgress& progress);
+                         RawlogWriter& writer, const OnProgress& progress);
 
 /// A recording of EuRoC's: mav0/ or the folder that holds it. Pairs stay raw, with the calibration
 /// of both cameras and their poses on the body; ground truth of the body from
 /// state_groundtruth_estimate0/data.csv, or from the one .csv file beside mav0/, where there.
 ImportReport importEuroc(const std::filesystem::path& folder, RawlogWriter& writer,
-                         const ImportProgress& progress);
+                         const OnProgress& progress);
 
 /// Section [Pair]: the calibration of a rectified pair.
 struct PairOptions {

@@ -12,6 +12,7 @@
 
 #include "riftmap/apps/command_line.h"
 #include "riftmap/core/options.h"
+#include "riftmap/core/progress.h"
 #include "riftmap/core/run_directory.h"
 
 namespace riftmap {
@@ -69,10 +70,12 @@ class Program : public mrpt::system::COutputLogger {
     const std::filesystem::path& out() const { return out_; }  ///< --out; empty if not given
     /// --out. Throws ConfigError if it was not given.
     const std::filesystem::path& requiredOut() const;
-    std::uint64_t seed() const { return seed_; }                 ///< default 0
-    int threads() const;                                         ///< at most so many work at once
-    bool overwrite() const { return overwrite_; }                ///< -w
-    bool progress() const { return !noProgress_; }               ///< --no-progress not given
+    std::uint64_t seed() const { return seed_; }    ///< default 0
+    int threads() const;                            ///< at most so many work at once
+    bool overwrite() const { return overwrite_; }   ///< -w
+    bool progress() const { return !noProgress_; }  ///< --no-progress not given
+    /// A Progress line that begins at the first call: for work that may not come.
+    OnProgress progressOf(const std::string& what, const std::string& unit) const;
     const std::string& commandText() const { return command_; }  ///< as typed, for manifests
     const std::vector<std::string>& configFiles() const;
 

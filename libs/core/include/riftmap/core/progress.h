@@ -3,11 +3,18 @@
 
 #include <chrono>
 #include <cstddef>
+#include <functional>
 #include <iosfwd>
 #include <optional>
 #include <string>
 
 namespace riftmap {
+
+/// "41 s", "5 min 3 s", "2 h 14 min"; rounded up to a second.
+std::string durationText(double seconds);
+
+/// What long work tells of itself from time to time: so many steps are done, of how many.
+using OnProgress = std::function<void(std::size_t done, std::size_t all)>;
 
 /// A line on stderr with share, rate and time left. On a terminal it refreshes in place; elsewhere
 /// (a log file) it is a line at every tenth of the way. Not thread-safe.

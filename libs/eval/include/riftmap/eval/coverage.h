@@ -74,8 +74,9 @@ class CoverageJudge {
  public:
     /// Throws std::invalid_argument for an empty mesh, std::runtime_error for a start inside a
     /// wall or outside the box. `mesh` need not outlive the judge; `caster` must.
+    /// `progress`: see observableSet().
     CoverageJudge(const TriangleMesh& mesh, const RayCaster& caster, const ViewSpace& space,
-                  const EvalOptions& options);
+                  const EvalOptions& options, const OnProgress& progress = {});
 
     const SurfaceSamples& samples() const { return samples_; }
     const ObservableSet& observable() const { return observable_; }

@@ -24,6 +24,9 @@ struct SensorModel {
     /// As the last view was, within the platform's range.
     static SensorModel of(const View& view, const PlatformLimits& limits);
 
+    /// Area of a plane across the optical axis that fills the left image [m^2].
+    double areaSeenAt(double depth) const;
+
     /// Largest depth [m] at which one view measures as finely (pixel spacing) and as accurately
     /// (sigma_z <= resolution / 2) as asked; within the range.
     double goodDepth(double resolution) const;

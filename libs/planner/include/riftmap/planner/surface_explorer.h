@@ -19,7 +19,7 @@ namespace riftmap {
 
 /// Section [Stop]: when a run ends although something is left to see.
 struct StopOptions {
-    int maxViews = 500;       ///< [views]
+    int maxViews = 1000;      ///< [views]
     double maxMetres = 1e6;   ///< of path [m]
     double maxSeconds = 1e6;  ///< of running [s]
     void describe(OptionTable& table);
