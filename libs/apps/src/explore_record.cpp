@@ -135,14 +135,14 @@ std::vector<std::vector<Coverage>> readCoverage(const fs::path& file,
     return all;
 }
 
-/// Before anything is cut.
-void checkHeader(const fs::path& steps) {
-    std::ifstream in(steps);
+/// Before anything is cut: a file without this column is of another version.
+void checkColumn(const fs::path& table, const std::string& column) {
+    std::ifstream in(table);
     std::string header;
-    if (std::getline(in, header) && !header.ends_with(",seconds") &&
-        header.find(",seconds,") == std::string::npos) {
-        throw FileError(steps.string() +
-                        ":1: no column 'seconds': recorded by another version; nothing is changed");
+    if (std::getline(in, header) &&
+        ("," + header + ",").find("," + column + ",") == std::string::npos) {
+        throw FileError(table.string() + ":1: no column '" + column +
+                        "': recorded by another version; nothing is changed");
     }
 }
 
@@ -187,8 +187,11 @@ ExploreRecord salvageRecord(const RunDirectory& directory, bool rawlog,
     const fs::path steps = directory.file("steps.csv");
     const fs::path curve = directory.file("coverage.csv");
     const fs::path trajectory = directory.file("trajectory.tum");
-    checkHeader(steps);
-    std::size_t rows = std::min(withoutHeader(wholeLines(steps)), wholeLines(trajectory));
+    const fs::path gains = directory.file("gains.csv");
+    checkColumn(steps, "seconds");
+    checkColumn(gains, "expected_share");
+    std::size_t rows = std::min({withoutHeader(wholeLines(steps)), withoutHeader(wholeLines(gains)),
+                                 wholeLines(trajectory)});
     if (!deltas.empty()) {
         rows = std::min(rows, withoutHeader(wholeLines(curve)));
     }
@@ -197,7 +200,7 @@ ExploreRecord salvageRecord(const RunDirectory& directory, bool rawlog,
         rows = std::min(rows, record.observations);
     }
     keepLines(trajectory, rows);
-    for (const fs::path& table : {steps, curve}) {
+    for (const fs::path& table : {steps, curve, gains}) {
         keepLines(table, rows > 0 ? rows + 1 : 0);
     }
     if (rows > 0) {

@@ -9,10 +9,10 @@
 #include <utility>
 
 #include "cutaway_picture.h"
+#include "riftmap/apps/explore_progress.h"
 #include "riftmap/apps/explore_report.h"
 #include "riftmap/apps/pictures.h"
 #include "riftmap/core/file.h"
-#include "riftmap/core/progress.h"
 #include "riftmap/eval/map_surface.h"
 #include "riftmap/planner/paper_view_planner.h"
 
@@ -125,7 +125,8 @@ ExploreRun::ExploreRun(ExploreProgram& program, RunDirectory& directory, bool re
         directory.file("gains.csv"),
         std::vector<std::string>{"view", "expected_tears_m2", "expected_finer_m2",
                                  "expected_unknown_m2", "new_m2", "well_known_m2",
-                                 "expected_views_left", "expected_share"});
+                                 "expected_views_left", "expected_share"},
+        mode);
     if (program.explore_.rawlog) {
         rawlog_ = std::make_unique<RawlogWriter>(
             directory.file("run.rawlog"), RawlogWriter::Images::kExternal,
@@ -279,13 +280,13 @@ void ExploreRun::onStep(const ExploreStep& measured, const Knowledge& knowledge)
     }
     history_.push_back(std::move(figures));
     const auto ahead = forecastNow(knowledge.minGain());
-    constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-    gains_->row({step.view, step.gain - step.coarseGain - step.unknownGain, step.coarseGain,
-                 step.unknownGain, step.newArea, step.wellKnownArea,
-                 ahead ? ahead->viewsLeft : kNone, ahead ? ahead->share : kNone});
     if (known) {
         recorder_->stepAgain(row);
     } else {
+        constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+        gains_->row({step.view, step.gain - step.coarseGain - step.unknownGain, step.coarseGain,
+                     step.unknownGain, step.newArea, step.wellKnownArea,
+                     ahead ? ahead->viewsLeft : kNone, ahead ? ahead->share : kNone});
         recorder_->step(graph(), row);
     }
     writePictureOfView(history_.size());
@@ -334,16 +335,12 @@ void ExploreRun::showProgress(const StepRow& row, const ExploreStep& step,
         line << ", " << 100 * c.cObs << " % at " << deltaName(c.delta);
     }
     if (ahead) {
-        const auto taken = static_cast<double>(history_.size());
-        const double left = std::min(ahead->viewsLeft, program_.stop_.maxViews - taken);
-        const std::size_t recent = history_.size() / 2;
-        const double seconds = (step.seconds - history_[recent].step.seconds) /
-                               static_cast<double>(history_.size() - 1 - recent);
-        const long views = std::lround(std::ceil(left));
-        line.precision(1);
-        line << "; about " << 100 * ahead->share << " % of what it will see, " << views
-             << (views == 1 ? " view and " : " views and ") << durationText(left * seconds)
-             << " left";
+        std::vector<double> seconds;
+        for (const StepFigures& f : history_) {
+            seconds.push_back(f.step.seconds);
+        }
+        line << "; "
+             << forecastText(*ahead, seconds, static_cast<std::size_t>(program_.stop_.maxViews));
     }
     std::cerr << line.str() << '\n';
 }

@@ -336,13 +336,14 @@ ObservableSet observableSet(const RayCaster& caster, const ViewSpace& space,
         std::vector<Sight> sights(count);
         const Spreading spreading(finder, samples);
         const auto rounds = roundsOf(options.directions, spacingOf(samples));
-        constexpr std::size_t kAtOnce = 4096;
+        // Large pieces, for the threads wait for each other after each.
+        const std::size_t atOnce = std::max<std::size_t>(4096, count / 50);
         std::size_t done = 0;
         for (const Round& round : rounds) {
             const std::vector<Sight> before = sights;
             const std::vector<Eigen::Vector2d> circle = SightFinder::goldenCircle(round.directions);
-            for (std::size_t begin = 0; begin < count; begin += kAtOnce) {
-                const std::size_t some = std::min(kAtOnce, count - begin);
+            for (std::size_t begin = 0; begin < count; begin += atOnce) {
+                const std::size_t some = std::min(atOnce, count - begin);
                 parallelForEach(some, 64, [&](std::size_t k) {
                     const std::size_t i = begin + k;
                     if (before[i].side == 0 &&

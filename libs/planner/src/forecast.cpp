@@ -31,8 +31,8 @@ std::optional<Forecast> forecast(std::span<const double> expected, std::span<con
     if (views < kFewest || !(least > 0)) {
         return std::nullopt;
     }
-    const std::size_t recent = std::clamp<std::size_t>(
-        static_cast<std::size_t>(kRecent * static_cast<double>(views)), kFewest - 1, views - 1);
+    const std::size_t recent =
+        std::max(kFewest - 1, static_cast<std::size_t>(kRecent * static_cast<double>(views)));
     const auto gains = expected.last(recent);
     if (!std::all_of(gains.begin(), gains.end(), [](double g) { return g > 0; })) {
         return std::nullopt;
@@ -51,17 +51,17 @@ std::optional<Forecast> forecast(std::span<const double> expected, std::span<con
     if (!(slope < 0)) {
         return std::nullopt;
     }
-    const double now = level + slope * middle;
+    const double now = std::exp(level + slope * middle);
+    const double soFar = sum(seen);
     Forecast result;
-    result.viewsLeft = std::max(0.0, (now - std::log(least)) / -slope);
-    if (result.viewsLeft > kFarthest * static_cast<double>(views)) {
+    result.viewsLeft = std::log(now / least) / -slope;
+    if (!(result.viewsLeft > 0) || result.viewsLeft > kFarthest * static_cast<double>(views) ||
+        !(soFar > 0)) {
         return std::nullopt;
     }
-    // The gains to come are the area below the line.
-    const double toCome = std::max(0.0, (std::exp(now) - least) / -slope);
-    const double soFar = sum(seen);
-    const double left = toCome * sum(seen.last(recent)) / sum(gains);
-    result.share = soFar > 0 ? soFar / (soFar + left) : 1.0;
+    const double factor = std::exp(slope);  // from view to view
+    const double gainsToCome = (now - least) * factor / (1 - factor);
+    result.share = soFar / (soFar + gainsToCome * sum(seen.last(recent)) / sum(gains));
     return result;
 }
 

@@ -62,23 +62,22 @@ std::optional<Eigen::Vector3d> Choice::lookOut(const RiftRecord& record, const E
     return p + place * out;
 }
 
-/// Calls f(eye) for places from where a tear can be seen, found by looking out of it to all sides,
-/// until f says false.
+/// Calls f(eye) for places from where a tear can be seen, found by looking out of it along so many
+/// directions to all sides, until f says false.
 template <class F>
-void Choice::forEachInSight(const RiftRecord& record, bool anywhere, const F& f) const {
-    constexpr int kDirections = 400;
+void Choice::forEachInSight(const RiftRecord& record, int directions, bool anywhere,
+                            const F& f) const {
     constexpr double kFacing = 0.2;  // cosine: surface seen at a flatter angle is not measured well
     // What it hides may face any way.
     const bool step = (record.cell.kinds & kDepthStep) != 0 || record.cell.hidden > 0;
     const Eigen::Vector3d normal = record.cell.openNormal.cast<double>();
     constexpr int kAtOnce = 40;
-    static_assert(kDirections % kAtOnce == 0);
     std::array<std::optional<Eigen::Vector3d>, kAtOnce> eyes;
-    for (int begin = 0; begin < kDirections; begin += kAtOnce) {
+    for (int begin = 0; begin < directions; begin += kAtOnce) {
         parallelForEach(kAtOnce, 4, [&](int k) {
             // So that the first ones are from all sides, too.
-            const int i = (begin + k) * 247 % kDirections;
-            const Eigen::Vector3d out = evenDirection(i, kDirections);
+            const int i = (begin + k) * 247 % directions;
+            const Eigen::Vector3d out = evenDirection(i, directions);
             const bool faces = step || normal.isZero() || out.dot(normal) > kFacing;
             eyes.at(static_cast<std::size_t>(k)) =
                 faces ? lookOut(record, out, anywhere) : std::nullopt;
@@ -93,18 +92,21 @@ void Choice::forEachInSight(const RiftRecord& record, bool anywhere, const F& f)
 
 /// Views of a tear from where it can be seen.
 void Choice::addAllInSight(const RiftRecord& record, std::size_t most) {
+    constexpr int kDirections = 400;
     const std::size_t wanted = candidates_.size() + most;
-    forEachInSight(record, false, [&](const Eigen::Vector3d& eye) {
+    forEachInSight(record, kDirections, false, [&](const Eigen::Vector3d& eye) {
         add(eye, record.cell.openPosition.cast<double>());
         return candidates_.size() < wanted;
     });
 }
 
 /// Whether it can be seen from a free place that the camera may fit in, a way there known or not.
+/// Asked before it is said that it cannot: in many directions, for slits are narrow.
 bool Choice::mayBeSeen(const RiftRecord& record) const {
+    constexpr int kDirections = 2000;
     const Eigen::Vector3d p = record.cell.openPosition.cast<double>();
     bool seen = false;
-    forEachInSight(record, true, [&](const Eigen::Vector3d& eye) {
+    forEachInSight(record, kDirections, true, [&](const Eigen::Vector3d& eye) {
         seen = k_.tiltAllowed(k_.sensor().lookingAt(eye, p));
         return !seen;
     });
@@ -126,6 +128,7 @@ void Choice::giveUp(const RiftRecord& record, bool reachable, bool visible) {
     const std::uint64_t key = record.cell.key;
     const std::string tries = std::to_string(record.attempts.size());
     const bool untried = !reachable || (!visible && record.attempts.empty());
+    const bool torn = record.cell.rim > 0 || record.cell.hidden > 0;
     if (untried && mayBeSeen(record)) {
         // The camera may fit there, so it must not be said that no view can close it.
         k_.ledger().giveUp(key, RiftState::kDeferred,
@@ -133,6 +136,9 @@ void Choice::giveUp(const RiftRecord& record, bool reachable, bool visible) {
     } else if (!reachable) {
         k_.ledger().giveUp(key, RiftState::kUnreachable,
                            "no place within the range of it is known to be free");
+    } else if (!visible && record.attempts.empty() && !torn) {
+        k_.ledger().giveUp(key, RiftState::kBelowResolution,
+                           "seen only from where it cannot be known as well as asked");
     } else if (!visible && record.attempts.empty()) {
         k_.ledger().giveUp(key, RiftState::kUnobservable,
                            "hidden from every place that can be reached");

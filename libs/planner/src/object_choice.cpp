@@ -148,8 +148,7 @@ void Choice::keepBestAround() {
     }
 }
 
-/// The one candidate that is left becomes a better one, by changes that get smaller. Four rounds of
-/// 12 do better than two of 24 of one size: around the dragon half a view less.
+/// The one candidate that is left becomes a better one, by changes that get smaller.
 void Choice::climbAround() {
     constexpr int kChanges = 12;
     for (const double scale : {2.0, 1.26, 0.79, 0.5}) {

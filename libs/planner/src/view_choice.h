@@ -66,7 +66,7 @@ class Choice {
     std::optional<Eigen::Vector3d> lookOut(const RiftRecord& record, const Eigen::Vector3d& out,
                                            bool anywhere) const;
     template <class F>
-    void forEachInSight(const RiftRecord& record, bool anywhere, const F& f) const;
+    void forEachInSight(const RiftRecord& record, int directions, bool anywhere, const F& f) const;
     bool mayBeSeen(const RiftRecord& record) const;
     bool inRange(const Eigen::Vector3d& place);
     void addAllInSight(const RiftRecord& record, std::size_t most);

@@ -72,8 +72,8 @@ TEST(Explore, fillsItsRunDirectory) {
     ASSERT_EQ(explore(roomRun(run, "N0", 4)), 0);
     for (const auto* name :
          {"graph.ply", "map.pixelgraph", "scene.3Dscene", "trajectory.tum", "steps.csv",
-          "rifts.csv", "rift_cells.csv", "summary.yaml", "config_used.ini", "manifest.yaml",
-          "run.rawlog", "report.html", "map.png"}) {
+          "rifts.csv", "rift_cells.csv", "gains.csv", "summary.yaml", "config_used.ini",
+          "manifest.yaml", "run.rawlog", "report.html", "map.png"}) {
         EXPECT_TRUE(std::filesystem::exists(run / name)) << name;
     }
     EXPECT_EQ(readCsv(run / "steps.csv").rows.size(), 4U);
@@ -151,7 +151,8 @@ TEST(Explore, theNumberOfThreadsChangesNoByte) {
     for (const std::string threads : {"1", "2"}) {
         ASSERT_EQ(explore(roomRun(folder / threads, "N3", 6) + Arguments{"--threads", threads}), 0);
     }
-    for (const auto* name : {"graph.ply", "trajectory.tum", "rifts.csv", "rift_cells.csv"}) {
+    for (const auto* name :
+         {"graph.ply", "trajectory.tum", "rifts.csv", "rift_cells.csv", "gains.csv"}) {
         EXPECT_EQ(readFile(folder / "1" / name), readFile(folder / "2" / name)) << name;
     }
 }
@@ -167,7 +168,8 @@ TEST(Explore, aResumedRunEndsAsIfItHadNotBeenInterrupted) {
                                 (folder / "cut").string(), "--set", "Stop.max_seconds=1e6",
                                 "--no-progress"}),
               0);
-    for (const auto* name : {"graph.ply", "trajectory.tum", "rifts.csv", "rift_cells.csv"}) {
+    for (const auto* name :
+         {"graph.ply", "trajectory.tum", "rifts.csv", "rift_cells.csv", "gains.csv"}) {
         EXPECT_EQ(readFile(folder / "whole" / name), readFile(folder / "cut" / name)) << name;
     }
 }
@@ -232,7 +234,7 @@ class ExploreResumed : public testing::Test {
     static void expectSame(const std::filesystem::path& a, const std::filesystem::path& b) {
         for (const auto* name :
              {"graph.ply", "run.rawlog", "trajectory.tum", "rifts.csv", "rift_cells.csv",
-              "coverage.csv", "map.png", "map_2.png", "config_used.ini"}) {
+              "coverage.csv", "gains.csv", "map.png", "map_2.png", "config_used.ini"}) {
             if (std::filesystem::exists(a / name)) {
                 EXPECT_EQ(readFile(a / name), readFile(b / name)) << name;
             }
@@ -339,6 +341,7 @@ TEST_F(ExploreResumed, whatCannotGoOnIsToldInOneLine) {
     const std::string other = failure({"--set", "Planner.view_cost=1"});
     EXPECT_EQ(other[0], '2') << other;
     EXPECT_NE(other.find("Planner.view_cost"), std::string::npos) << other;
+    const std::string gains = beginning(cut_ / "gains.csv", 3);  // steps.csv has two views
     // A configuration that was tampered with stands for a version that plans otherwise.
     std::string config = readFile(cut_ / "config_used.ini");
     const std::string seed = "\nseed = 0";
@@ -349,6 +352,7 @@ TEST_F(ExploreResumed, whatCannotGoOnIsToldInOneLine) {
     EXPECT_EQ(elsewhere[0], '1') << elsewhere;
     EXPECT_NE(elsewhere.find("is not from where this run would take it"), std::string::npos)
         << elsewhere;
+    EXPECT_EQ(readFile(cut_ / "gains.csv"), gains) << "changed by what did not go on";
 }
 
 /// An object on its own, known to stand in a box: ends by itself and covers what can be seen.

@@ -23,6 +23,9 @@ struct ChoiceTwin {
         choice.addAllInSight(record, most);
         return choice.candidates_;
     }
+    static void giveUpHidden(Choice& choice, const RiftRecord& record) {
+        choice.giveUp(record, true, false);
+    }
     static std::optional<ViewPlan> lastResorts(Choice& choice) { return choice.lastResorts(); }
 
     static std::vector<Candidate>& candidates(Choice& choice) { return choice.candidates_; }

@@ -237,5 +237,43 @@ TEST(LastResorts, leaveTheSmallestOfThousandsToTheOthersReason) {
     EXPECT_LE(largest, smallest);
 }
 
+TEST(LastResorts, callHiddenWhatATearMayHideAndNotWhatIsSeenTooCoarsely) {
+    GraphOptions fine;
+    fine.targetResolution = 0.005;
+    PixelGraph graph(fine);
+    PlatformLimits limits;
+    limits.boxMin = Eigen::Vector3d(-1, -2, -2);
+    limits.boxMax = Eigen::Vector3d(3, 2, 2);
+    limits.nearLimit = 4.5;  // farther from the wall than all that is known
+    limits.farLimit = 4.6;
+    PlannerOptions options;
+    options.voxelSize = 0.1;
+    Knowledge knowledge(graph, limits, options);
+    const View view = test::viewOf(lookAt({0, 0, 0}, {1, 0, 0}), test::wall(2.0));
+    graph.merge(view);
+    knowledge.update(view);
+    knowledge.updateReach();
+    std::vector<Pose> pool;
+    ObjectMemory memory;
+    Choice choice(knowledge, pool, memory);
+    std::size_t torn = 0;
+    std::size_t coarse = 0;
+    for (const auto& [key, record] : knowledge.ledger().records()) {
+        if (record.state != RiftState::kOpen || torn + coarse >= 120) {
+            continue;
+        }
+        ChoiceTwin::giveUpHidden(choice, record);
+        if (record.cell.rim > 0 || record.cell.hidden > 0) {
+            EXPECT_EQ(record.state, RiftState::kUnobservable) << record.reason;
+            ++torn;
+        } else {
+            EXPECT_EQ(record.state, RiftState::kBelowResolution) << record.reason;
+            ++coarse;
+        }
+    }
+    EXPECT_GT(torn, 10U);
+    EXPECT_GT(coarse, 10U);
+}
+
 }  // namespace
 }  // namespace riftmap

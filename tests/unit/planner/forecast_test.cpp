@@ -26,24 +26,21 @@ std::vector<double> times(std::vector<double> values, double factor) {
     return values;
 }
 
-TEST(Forecast, CarriesAnEvenFallOn) {
-    const double factor = 0.9;
-    const auto gains = falling(20, factor);
-    // Views bring half of what they promise. From 0.9^19 it takes 25 views to 0.9^44.
-    const auto f = forecast(gains, times(gains, 0.5), std::pow(factor, 44));
-    ASSERT_TRUE(f);
-    EXPECT_NEAR(f->viewsLeft, 25, 1e-9);
-    const double soFar = 0.5 * (1 - std::pow(factor, 20)) / (1 - factor);
-    const double left = 0.5 * (std::pow(factor, 19) - std::pow(factor, 44)) / -std::log(factor);
-    EXPECT_NEAR(f->share, soFar / (soFar + left), 1e-9);
+double total(const std::vector<double>& values) {
+    double sum = 0;
+    for (const double v : values) {
+        sum += v;
+    }
+    return sum;
 }
 
-TEST(Forecast, KnowsTheEnd) {
-    const auto gains = falling(20, 0.9);
-    const auto f = forecast(gains, gains, 2 * gains.back());
+TEST(Forecast, CarriesAnEvenFallOn) {
+    // Views bring half of what they promise. The gain of view 44 is the least that is worth one.
+    const auto all = times(falling(45, 0.9), 0.5);
+    const auto f = forecast(falling(20, 0.9), times(falling(20, 0.9), 0.5), std::pow(0.9, 44));
     ASSERT_TRUE(f);
-    EXPECT_EQ(f->viewsLeft, 0);
-    EXPECT_EQ(f->share, 1);
+    EXPECT_NEAR(f->viewsLeft, 25, 1e-9);
+    EXPECT_NEAR(f->share, total({all.begin(), all.begin() + 20}) / total(all), 1e-9);
 }
 
 TEST(Forecast, GoesByTheLastViews) {
@@ -57,23 +54,37 @@ TEST(Forecast, GoesByTheLastViews) {
     EXPECT_NEAR(f->viewsLeft, 30, 1e-9);
 }
 
-TEST(Forecast, SaysNothingWhereNothingCanBeSaid) {
-    const double least = 1e-3;
-    EXPECT_FALSE(forecast(falling(9, 0.9), falling(9, 0.9), least)) << "too few views";
-    EXPECT_TRUE(forecast(falling(10, 0.7), falling(10, 0.7), least));
-    EXPECT_FALSE(forecast(falling(20, 1.1), falling(20, 1.1), least)) << "gains grow";
-    EXPECT_FALSE(forecast(falling(20, 1.0), falling(20, 1.0), least)) << "gains do not fall";
-    EXPECT_FALSE(forecast(falling(20, 0.999), falling(20, 0.999), least)) << "far away";
-    EXPECT_FALSE(forecast(falling(20, 0.9), falling(20, 0.9), 0)) << "no surface";
-    const std::vector<double> none(20, 0.0);
-    EXPECT_FALSE(forecast(none, falling(20, 0.9), least)) << "a planner that expects nothing";
+TEST(Forecast, DoesNotAskForAGainOfTheFirstView) {
+    auto gains = falling(10, 0.7);
+    gains[0] = 0;
+    const auto f = forecast(gains, falling(10, 0.7), std::pow(0.7, 14));
+    ASSERT_TRUE(f);
+    EXPECT_NEAR(f->viewsLeft, 5, 1e-9);
 }
 
-TEST(Forecast, OfAMapWithoutSurfaceIsOfNone) {
-    const std::vector<double> none(20, 0.0);
-    const auto f = forecast(falling(20, 0.8), none, 1e-3);
-    ASSERT_TRUE(f);
-    EXPECT_EQ(f->share, 1);
+TEST(Forecast, SaysNothingWhereNothingCanBeSaid) {
+    const double least = 1e-3;
+    const auto says = [&](const std::vector<double>& gains) {
+        return forecast(gains, falling(static_cast<int>(gains.size()), 0.9), least).has_value();
+    };
+    EXPECT_TRUE(says(falling(20, 0.8)));
+    EXPECT_FALSE(says(falling(9, 0.7))) << "too few views";
+    EXPECT_FALSE(says(falling(20, 1.1))) << "gains grow";
+    EXPECT_FALSE(says(falling(20, 1.0))) << "gains do not fall";
+    auto gap = falling(20, 0.8);
+    gap[15] = 0;
+    EXPECT_FALSE(says(gap)) << "a view without a promise";
+    EXPECT_FALSE(says(std::vector<double>(20, 0.0))) << "a planner that expects nothing";
+    EXPECT_FALSE(says(falling(40, 0.8))) << "below the least: any view may be the last";
+    const auto gains = falling(20, 0.8);
+    EXPECT_FALSE(forecast(gains, gains, 0)) << "nothing that a share is of";
+    EXPECT_FALSE(forecast(gains, std::vector<double>(20, 0.0), least)) << "no surface";
+}
+
+TEST(Forecast, LooksNoFartherThanTwiceAsManyViews) {
+    const auto gains = falling(20, 0.95);
+    EXPECT_TRUE(forecast(gains, gains, std::pow(0.95, 19 + 39)));
+    EXPECT_FALSE(forecast(gains, gains, std::pow(0.95, 19 + 41)));
 }
 
 TEST(Forecast, RefusesWhatIsNotTwoFiguresAView) {

@@ -105,22 +105,34 @@ TEST_P(EveryMatcher, RefusesWhatIsNoPair) {
 }
 
 TEST_P(EveryMatcher, TakesImagesAboutAsWideAsItsRange) {
-    cv::Mat noise(12, 120, CV_8UC1);
+    cv::Mat noise(40, 320, CV_8UC1);
     cv::RNG(5).fill(noise, cv::RNG::UNIFORM, 0, 256);
-    for (const int range : {3, 16, 18, 96}) {
+    for (const auto& [first, range] :
+         {std::pair(0, 3), std::pair(0, 16), std::pair(0, 18), std::pair(0, 96), std::pair(5, 16),
+          std::pair(-10, 16), std::pair(-32, 16), std::pair(-40, 18)}) {
         StereoOptions options;
         options.matcher = GetParam();
+        options.minDisparity = first;
         options.numDisparities = range;
         const auto matcher = makeStereoMatcher(options);
-        for (int width = 1; width <= range + 20; ++width) {
-            const cv::Mat image = noise.colRange(0, width);
+        const int reach = std::max(first + range - 1, 0);
+        for (int width = 1; width <= reach + 60; ++width) {
+            constexpr int kLeft = 60;
+            const int right = kLeft + first + range / 2;
             DisparityImage out;
-            matcher->compute(image, image, out);
+            matcher->compute(noise.colRange(kLeft, kLeft + width),
+                             noise.colRange(right, right + width), out);
             ASSERT_EQ(out.width, width);
+            int matched = 0;
             for (int r = 0; r < out.height; ++r) {
-                for (int c = 0; c < std::min(width, range - 1); ++c) {
-                    EXPECT_FALSE(out.valid(c, r)) << width << " x 12, range " << range;
+                for (int c = 0; c < width; ++c) {
+                    EXPECT_FALSE(c < reach && out.valid(c, r))
+                        << width << " x 40, " << range << " disparities from " << first;
+                    matched += out.valid(c, r) ? 1 : 0;
                 }
+            }
+            if (width == reach + 60) {
+                EXPECT_GT(matched, 0) << range << " disparities from " << first;
             }
         }
     }

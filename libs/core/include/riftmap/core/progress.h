@@ -10,10 +10,12 @@
 
 namespace riftmap {
 
-/// "41 s", "5 min 3 s", "2 h 14 min"; rounded up to a second.
+/// "41 s", "5 min 3 s", "2 h 14 min" of a finite time >= 0 [s]; rounded up to a second, hours down
+/// to a minute.
 std::string durationText(double seconds);
 
-/// What long work tells of itself from time to time: so many steps are done, of how many.
+/// What long work tells of itself from time to time: so many steps are done, of how many. Called by
+/// the thread that asked for the work; what it throws stops the work and comes through.
 using OnProgress = std::function<void(std::size_t done, std::size_t all)>;
 
 /// A line on stderr with share, rate and time left. On a terminal it refreshes in place; elsewhere

@@ -24,7 +24,8 @@ struct SensorModel {
     /// As the last view was, within the platform's range.
     static SensorModel of(const View& view, const PlatformLimits& limits);
 
-    /// Area of a plane across the optical axis that fills the left image [m^2].
+    /// Area of a plane across the optical axis, so many metres away, that fills the left image
+    /// [m^2]: its first columns, too, for it is a measure of scale.
     double areaSeenAt(double depth) const;
 
     /// Largest depth [m] at which one view measures as finely (pixel spacing) and as accurately

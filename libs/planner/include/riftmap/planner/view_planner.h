@@ -116,7 +116,8 @@ class Knowledge {
     /// known, or if that is 0 a share of 0.0004, with exact depth 0.0001, with
     /// DepthKind::kPixelwise 0.0007; where the box of the surfaces is known 0.0003, 0.0004 and
     /// 0.00048; then of no more surface than fills ten images at the far limit, so that large
-    /// buildings are mapped as completely as small ones.
+    /// buildings are mapped as completely as small ones. (Surface counts by the faces of its cells
+    /// there, about 1.5 times its area: SurfaceSummary::area().)
     double minGain() const;
     /// True if this place was seen through and no surface of the map is within the platform's
     /// clearance, whether or not a way there is known. Thread-safe while nothing changes.
