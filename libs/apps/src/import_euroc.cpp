@@ -55,12 +55,7 @@ RawCamera readCamera(const fs::path& file) {
     camera.intrinsics.nrows = static_cast<std::uint32_t>(size[1]);
     camera.intrinsics.setIntrinsicParamsFromValues(k[0], k[1], k[2], k[3]);
     camera.intrinsics.setDistortionPlumbBob(d[0], d[1], d[2], d[3], 0);
-    for (int i = 0; i < 3; ++i) {
-        for (int j = 0; j < 3; ++j) {
-            camera.body_T_camera.rotation(i, j) = t[static_cast<std::size_t>(4 * i + j)];
-        }
-        camera.body_T_camera.translation[i] = t[static_cast<std::size_t>(4 * i + 3)];
-    }
+    camera.body_T_camera = poseOfRows(t);
     if (!isValid(camera.body_T_camera)) {
         throw FileError(file.string() + ": T_BS: not a rotation and a translation");
     }
@@ -85,7 +80,7 @@ std::map<std::int64_t, fs::path> readImageList(const fs::path& camera) {
 
 /// The file with the body's poses; empty if there is none.
 fs::path groundTruthFile(const fs::path& mav) {
-    const auto own = mav / "state_groundtruth_estimate0" / "data.csv";
+    auto own = mav / "state_groundtruth_estimate0" / "data.csv";
     if (fs::exists(own)) {
         return own;
     }

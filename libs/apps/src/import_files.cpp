@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "import_files.h"
 
+#include <Eigen/Core>
 #include <opencv2/imgcodecs.hpp>
 #include <sstream>
 
@@ -39,11 +40,19 @@ std::vector<double> numbersIn(const std::string& text, const std::string& where)
     return numbers;
 }
 
+Pose poseOfRows(const std::vector<double>& rows) {
+    const Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>> matrix(rows.data());
+    Pose pose;
+    pose.rotation = matrix.leftCols<3>();
+    pose.translation = matrix.col(3);
+    return pose;
+}
+
 cv::Mat readImage(const std::filesystem::path& file) {
     if (!std::filesystem::is_regular_file(file)) {
         throw FileError(file.string() + ": no such file");
     }
-    const cv::Mat image = cv::imread(file.string(), cv::IMREAD_ANYCOLOR | cv::IMREAD_ANYDEPTH);
+    cv::Mat image = cv::imread(file.string(), cv::IMREAD_ANYCOLOR | cv::IMREAD_ANYDEPTH);
     if (image.empty()) {
         throw FileError(file.string() + ": not an image that can be read");
     }

@@ -74,14 +74,7 @@ StereoCamera readCamera(const fs::path& folder, std::size_t leftRow) {
 std::vector<Pose> readPoses(const fs::path& file) {
     std::vector<Pose> poses;
     for (const auto& row : rowsOfTwelve(file)) {
-        Pose pose;
-        for (int i = 0; i < 3; ++i) {
-            for (int j = 0; j < 3; ++j) {
-                pose.rotation(i, j) = row[static_cast<std::size_t>(4 * i + j)];
-            }
-            pose.translation[i] = row[static_cast<std::size_t>(4 * i + 3)];
-        }
-        poses.push_back(pose);
+        poses.push_back(poseOfRows(row));
     }
     return poses;
 }

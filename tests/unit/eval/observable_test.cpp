@@ -144,7 +144,7 @@ TEST_F(RoomSpace, ABadStartIsNamed) {
     const RayCaster caster(mesh_);
     space_.start = {0.1, 1, 1};
     try {
-        ReachableSpace(caster, space_, 0.1);
+        const ReachableSpace space(caster, space_, 0.1);
         FAIL();
     } catch (const std::runtime_error& e) {
         EXPECT_NE(std::string(e.what()).find("nearer than the clearance"), std::string::npos);

@@ -12,9 +12,9 @@ namespace {
 
 /// Gains that fall by the same factor a view, from 1 m^2 in view 0 on.
 std::vector<double> falling(int views, double factor) {
-    std::vector<double> gains;
-    for (int i = 0; i < views; ++i) {
-        gains.push_back(std::pow(factor, i));
+    std::vector<double> gains(static_cast<std::size_t>(views), 1.0);
+    for (std::size_t i = 1; i < gains.size(); ++i) {
+        gains[i] = factor * gains[i - 1];
     }
     return gains;
 }
