@@ -63,7 +63,7 @@ std::vector<World> worlds() {
          {"World.mesh=" + data + "/world_aws_small_house/aws_small_house.obj"},
          {"N0"},
          false,
-         6},
+         9},
         {"courtyard", "explore-courtyard.ini", {}, {"N4"}, false, 6},
     };
     std::erase_if(all, [&](const World& w) {
