@@ -190,6 +190,10 @@ ExploreRecord salvageRecord(const RunDirectory& directory, bool rawlog,
     const fs::path gains = directory.file("gains.csv");
     checkColumn(steps, "seconds");
     checkColumn(gains, "expected_share");
+    if (wholeLines(steps) > 0 && wholeLines(gains) == 0) {
+        throw FileError(gains.string() + ": missing, or without a line, beside " +
+                        steps.filename().string() + "; nothing is changed");
+    }
     std::size_t rows = std::min({withoutHeader(wholeLines(steps)), withoutHeader(wholeLines(gains)),
                                  wholeLines(trajectory)});
     if (!deltas.empty()) {

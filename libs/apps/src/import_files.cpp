@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <opencv2/imgcodecs.hpp>
 #include <sstream>
+#include <stdexcept>
 
 #include "riftmap/core/text.h"
 
@@ -41,6 +42,9 @@ std::vector<double> numbersIn(const std::string& text, const std::string& where)
 }
 
 Pose poseOfRows(const std::vector<double>& rows) {
+    if (rows.size() < 12) {
+        throw std::invalid_argument("a pose takes 12 numbers, not " + std::to_string(rows.size()));
+    }
     const Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>> matrix(rows.data());
     Pose pose;
     pose.rotation = matrix.leftCols<3>();

@@ -22,7 +22,8 @@ std::vector<TextLine> readLines(const std::filesystem::path& file);
 /// Numbers between blanks, commas or semicolons. Throws FileError with `where`.
 std::vector<double> numbersIn(const std::string& text, const std::string& where);
 
-/// The pose [R|t] of which the first three rows of four are given, 12 numbers or more.
+/// The pose [R|t] of which the first three rows of four are given. Throws std::invalid_argument if
+/// there are fewer than 12 numbers.
 Pose poseOfRows(const std::vector<double>& rows);
 
 /// An image as it is, 8-bit grey or BGR; 16-bit is refused. Throws FileError.

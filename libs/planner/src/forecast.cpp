@@ -59,8 +59,8 @@ std::optional<Forecast> forecast(std::span<const double> expected, std::span<con
         !(soFar > 0)) {
         return std::nullopt;
     }
-    const double factor = std::exp(slope);  // from view to view
-    const double gainsToCome = (now - least) * factor / (1 - factor);
+    // A geometric series: exp(slope) is the factor from view to view.
+    const double gainsToCome = (now - least) * std::exp(slope) / -std::expm1(slope);
     result.share = soFar / (soFar + gainsToCome * sum(seen.last(recent)) / sum(gains));
     return result;
 }

@@ -157,7 +157,7 @@ void Choice::giveUp(const RiftRecord& record, bool reachable, bool visible) {
 /// closes (plain walls) the largest speak for the others.
 std::optional<ViewPlan> Choice::lastResorts() {
     std::vector<const RiftRecord*> left = scorer_.open();
-    // A look takes 5 ms, but longer where many are open.
+    // A look takes 5 ms as a rule, but longer where many are open.
     const std::size_t most =
         std::min<std::size_t>(2000, 60000000 / std::max<std::size_t>(left.size(), 1));
     const double cell = k_.summary().cellSize();

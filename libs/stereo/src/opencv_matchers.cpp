@@ -46,8 +46,8 @@ void computeWith(cv::StereoMatcher& matcher, const StereoOptions& options, int w
     out.minDisparity = static_cast<float>(options.minDisparity);
     out.maxDisparity = static_cast<float>(options.minDisparity + options.numDisparities - 1);
     out.firstColumn = std::clamp(options.minDisparity + options.numDisparities - 1, 0, out.width);
-    // Columns that see the whole of OpenCV's own range, a multiple of 16, in the right image. If
-    // there are none, cv::StereoSGBM's three-way mode writes where there is no memory.
+    // The columns that cv::StereoSGBM matches, of a range that is a multiple of 16. If there are
+    // none, its three-way mode writes where there is no memory.
     const int firstMatched = std::max(options.minDisparity + matcher.getNumDisparities(), 0);
     const int endMatched = out.width + std::min(options.minDisparity, 0);
     if (endMatched <= firstMatched || std::min(out.width, out.height) <= window) {

@@ -60,7 +60,8 @@ std::vector<World> worlds() {
         {"rooms", "explore-indoor.ini", {}, {"N0"}, false, 4},
         {"small_house",
          "explore-indoor.ini",
-         {"World.mesh=" + data + "/world_aws_small_house/aws_small_house.obj"},
+         {"World.mesh=" + data + "/world_aws_small_house/aws_small_house.obj",
+          "Eval.samples=300000"},
          {"N0"},
          false,
          9},
@@ -173,6 +174,8 @@ void writeRows(riftmap::CsvWriter& csv, const std::string& run, const fs::path& 
     put("plan_ms_p95", "plan_ms_p95");
     put("accuracy", "accuracy_headline");
     put("explained", "explained");
+    put("verdicts", "certificate_verdicts");
+    put("verdicts_right", "certificate_right");
     put("collisions", "collisions");
     put("auc_10", "auc_10");
     put("stop_reason", "stop_reason");

@@ -217,6 +217,7 @@ class ExploreResumed : public testing::Test {
         std::filesystem::rename(run / "run.rawlog", run / "run.rawlog.part");
         cutEnd(run / "run.rawlog.part", 100);
         cutEnd(run / "steps.csv", 7);
+        cutEnd(run / "gains.csv", 3);
     }
     /// Without the columns of measured times.
     static std::string withoutTimes(const std::filesystem::path& file) {
@@ -338,6 +339,16 @@ TEST_F(ExploreResumed, whatCannotGoOnIsToldInOneLine) {
         const int code = explore(resume(cut_, 4) + more);
         return std::to_string(code) + " " + testing::internal::GetCapturedStderr();
     };
+    std::filesystem::rename(cut_ / "gains.csv", cut_ / "elsewhere");
+    const std::string steps = readFile(cut_ / "steps.csv");
+    const std::string missing = failure({});
+    EXPECT_EQ(missing[0], '1') << missing;
+    EXPECT_NE(missing.find("gains.csv: missing"), std::string::npos) << missing;
+    folder_.write("cut/gains.csv", "view,expected_tears_m2\n0,0\n1,1\n");
+    const std::string older = failure({});
+    EXPECT_NE(older.find("no column 'expected_share'"), std::string::npos) << older;
+    EXPECT_EQ(readFile(cut_ / "steps.csv"), steps) << "changed by what did not go on";
+    std::filesystem::rename(cut_ / "elsewhere", cut_ / "gains.csv");
     const std::string other = failure({"--set", "Planner.view_cost=1"});
     EXPECT_EQ(other[0], '2') << other;
     EXPECT_NE(other.find("Planner.view_cost"), std::string::npos) << other;

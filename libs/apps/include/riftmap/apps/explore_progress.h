@@ -14,7 +14,8 @@ namespace riftmap {
 /// @param seconds since the run began, as each view was done, in order [s]; two at least. The
 /// median step of the last half is the time of a view: when a run is resumed there is one long
 /// step.
-/// @param maxViews limit of the run, at least as many as were taken unless a run is resumed
+/// @param maxViews limit of the run, at least as many as were taken unless a run is resumed. Limits
+/// on metres and seconds are not looked at.
 std::string forecastText(const Forecast& ahead, std::span<const double> seconds,
                          std::size_t maxViews);
 

@@ -23,7 +23,8 @@ enum class RiftState {
     kUnreachable,      ///< no place known to be free lies within the range of it
     kUnobservable,     ///< hidden from every place that can be reached
     kBelowResolution,  ///< smaller than the surface was asked to be known, or too small to be worth
-                       ///< a view, or finer than the views of it resolved
+                       ///< a view, or finer than the views of it resolved, or no tear, but seen
+                       ///< only from where it cannot be known as well as asked
     kResolved,         ///< was open, is closed
 };
 inline constexpr std::size_t kRiftStates = 6;
