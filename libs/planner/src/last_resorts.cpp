@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <numeric>
 #include <string>
 #include <unordered_map>
 
@@ -64,20 +65,21 @@ std::optional<Eigen::Vector3d> Choice::lookOut(const RiftRecord& record, const E
 
 /// Calls f(eye) for places from where a tear can be seen, found by looking out of it along so many
 /// directions to all sides, until f says false.
-template <class F>
-void Choice::forEachInSight(const RiftRecord& record, int directions, bool anywhere,
-                            const F& f) const {
+template <int kDirections, class F>
+void Choice::forEachInSight(const RiftRecord& record, bool anywhere, const F& f) const {
     constexpr double kFacing = 0.2;  // cosine: surface seen at a flatter angle is not measured well
     // What it hides may face any way.
     const bool step = (record.cell.kinds & kDepthStep) != 0 || record.cell.hidden > 0;
     const Eigen::Vector3d normal = record.cell.openNormal.cast<double>();
     constexpr int kAtOnce = 40;
+    constexpr int kApart = 247;
+    static_assert(kDirections % kAtOnce == 0 && std::gcd(kDirections, kApart) == 1);
     std::array<std::optional<Eigen::Vector3d>, kAtOnce> eyes;
-    for (int begin = 0; begin < directions; begin += kAtOnce) {
+    for (int begin = 0; begin < kDirections; begin += kAtOnce) {
         parallelForEach(kAtOnce, 4, [&](int k) {
             // So that the first ones are from all sides, too.
-            const int i = (begin + k) * 247 % directions;
-            const Eigen::Vector3d out = evenDirection(i, directions);
+            const int i = (begin + k) * kApart % kDirections;
+            const Eigen::Vector3d out = evenDirection(i, kDirections);
             const bool faces = step || normal.isZero() || out.dot(normal) > kFacing;
             eyes.at(static_cast<std::size_t>(k)) =
                 faces ? lookOut(record, out, anywhere) : std::nullopt;
@@ -92,9 +94,8 @@ void Choice::forEachInSight(const RiftRecord& record, int directions, bool anywh
 
 /// Views of a tear from where it can be seen.
 void Choice::addAllInSight(const RiftRecord& record, std::size_t most) {
-    constexpr int kDirections = 400;
     const std::size_t wanted = candidates_.size() + most;
-    forEachInSight(record, kDirections, false, [&](const Eigen::Vector3d& eye) {
+    forEachInSight<400>(record, false, [&](const Eigen::Vector3d& eye) {
         add(eye, record.cell.openPosition.cast<double>());
         return candidates_.size() < wanted;
     });
@@ -103,10 +104,9 @@ void Choice::addAllInSight(const RiftRecord& record, std::size_t most) {
 /// Whether it can be seen from a free place that the camera may fit in, a way there known or not.
 /// Asked before it is said that it cannot: in many directions, for slits are narrow.
 bool Choice::mayBeSeen(const RiftRecord& record) const {
-    constexpr int kDirections = 2000;
     const Eigen::Vector3d p = record.cell.openPosition.cast<double>();
     bool seen = false;
-    forEachInSight(record, kDirections, true, [&](const Eigen::Vector3d& eye) {
+    forEachInSight<2000>(record, true, [&](const Eigen::Vector3d& eye) {
         seen = k_.tiltAllowed(k_.sensor().lookingAt(eye, p));
         return !seen;
     });

@@ -65,8 +65,8 @@ class Choice {
     std::optional<ViewPlan> planFor(const Candidate& candidate) const;
     std::optional<Eigen::Vector3d> lookOut(const RiftRecord& record, const Eigen::Vector3d& out,
                                            bool anywhere) const;
-    template <class F>
-    void forEachInSight(const RiftRecord& record, int directions, bool anywhere, const F& f) const;
+    template <int kDirections, class F>
+    void forEachInSight(const RiftRecord& record, bool anywhere, const F& f) const;
     bool mayBeSeen(const RiftRecord& record) const;
     bool inRange(const Eigen::Vector3d& place);
     void addAllInSight(const RiftRecord& record, std::size_t most);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 
 #include "choice_twin.h"
 #include "planner_scene.h"
@@ -197,26 +198,37 @@ TEST_P(LookOutTwin, looksToAllSidesBeforeItSaysHidden) {
 
 INSTANTIATE_TEST_SUITE_P(Seeds, LookOutTwin, testing::Range(1U, 6U));
 
-TEST(LastResorts, leaveTheSmallestOfThousandsToTheOthersReason) {
-    GraphOptions fine;
-    fine.targetResolution = 0.005;  // the wall is sampled far more sparsely: all of it is open
-    PixelGraph graph(fine);
-    PlatformLimits limits;
-    limits.boxMin = Eigen::Vector3d(-1, -2, -2);
-    limits.boxMax = Eigen::Vector3d(3, 2, 2);
-    limits.farLimit = 2.6;
-    PlannerOptions options;
-    options.minGain = 1;  // no view is worth it
-    options.voxelSize = 0.1;
-    Knowledge knowledge(graph, limits, options);
-    const View view = test::viewOf(lookAt({0, 0, 0}, {1, 0, 0}), test::wall(2.0));
-    graph.merge(view);
-    knowledge.update(view);
-    knowledge.updateReach();
-    const auto open = knowledge.ledger().counts()[static_cast<std::size_t>(RiftState::kOpen)];
-    ASSERT_GT(open, 4000U);
+/// A wall two metres ahead, sampled far more sparsely than asked: all of it is open.
+class LastResorts : public testing::Test {
+ protected:
+    /// As it is seen at once, from where the camera is; limits of the range [m].
+    std::unique_ptr<Knowledge> knowledgeOf(double nearLimit, double farLimit, double minGain) {
+        PlatformLimits limits;
+        limits.boxMin = Eigen::Vector3d(-1, -2, -2);
+        limits.boxMax = Eigen::Vector3d(3, 2, 2);
+        limits.nearLimit = nearLimit;
+        limits.farLimit = farLimit;
+        PlannerOptions options;
+        options.minGain = minGain;
+        options.voxelSize = 0.1;
+        auto knowledge = std::make_unique<Knowledge>(graph, limits, options);
+        const View view = test::viewOf(lookAt({0, 0, 0}, {1, 0, 0}), test::wall(2.0));
+        graph.merge(view);
+        knowledge->update(view);
+        knowledge->updateReach();
+        return knowledge;
+    }
+
+    PixelGraph graph{test::graphOptions(0.005)};
     std::vector<Pose> pool;
     ObjectMemory memory;
+};
+
+TEST_F(LastResorts, leaveTheSmallestOfThousandsToTheOthersReason) {
+    const auto known = knowledgeOf(PlatformLimits().nearLimit, 2.6, 1);  // no view is worth it
+    Knowledge& knowledge = *known;
+    const auto open = knowledge.ledger().counts()[static_cast<std::size_t>(RiftState::kOpen)];
+    ASSERT_GT(open, 4000U);
     Choice choice(knowledge, pool, memory);
     EXPECT_FALSE(ChoiceTwin::lastResorts(choice));
     std::size_t notLookedAt = 0;
@@ -237,24 +249,10 @@ TEST(LastResorts, leaveTheSmallestOfThousandsToTheOthersReason) {
     EXPECT_LE(largest, smallest);
 }
 
-TEST(LastResorts, callHiddenWhatATearMayHideAndNotWhatIsSeenTooCoarsely) {
-    GraphOptions fine;
-    fine.targetResolution = 0.005;
-    PixelGraph graph(fine);
-    PlatformLimits limits;
-    limits.boxMin = Eigen::Vector3d(-1, -2, -2);
-    limits.boxMax = Eigen::Vector3d(3, 2, 2);
-    limits.nearLimit = 4.5;  // farther from the wall than all that is known
-    limits.farLimit = 4.6;
-    PlannerOptions options;
-    options.voxelSize = 0.1;
-    Knowledge knowledge(graph, limits, options);
-    const View view = test::viewOf(lookAt({0, 0, 0}, {1, 0, 0}), test::wall(2.0));
-    graph.merge(view);
-    knowledge.update(view);
-    knowledge.updateReach();
-    std::vector<Pose> pool;
-    ObjectMemory memory;
+TEST_F(LastResorts, callHiddenWhatATearMayHideAndNotWhatIsSeenTooCoarsely) {
+    // Farther from the wall than all that is known.
+    const auto known = knowledgeOf(4.5, 4.6, 0);
+    Knowledge& knowledge = *known;
     Choice choice(knowledge, pool, memory);
     std::size_t torn = 0;
     std::size_t coarse = 0;

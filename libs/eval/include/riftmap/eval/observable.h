@@ -94,8 +94,8 @@ struct ObservableSet {
 /// position within the range before it meets a surface. Then, until nothing changes, samples not
 /// seen yet are tried from the positions that see their neighbours (narrow views). Exact ray
 /// casting; a yes is certain, a no is as fine as `directions`. Same result for any number of
-/// threads. Reads and writes options.cache. In a building of 60,000 samples it takes a minute or
-/// two: `progress`, if any, is told from time to time, not if the set is in the cache.
+/// threads. Reads and writes options.cache. In a building of two million samples it takes minutes:
+/// `progress`, if any, is told from time to time, not if the set is in the cache.
 ObservableSet observableSet(const RayCaster& caster, const ViewSpace& space,
                             const SurfaceSamples& samples, const EvalOptions& options,
                             const OnProgress& progress = {});
